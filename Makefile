@@ -28,7 +28,7 @@ test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilato
 	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(SEED), with SEED=$(SEED)))
 	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' $(PYTHON) -m pytest -q -n $(JOBS) $(if $K,-k '$K') tb
 
-check: fresh lint promises test prove  ## what every change must pass
+check: fresh lint promises test prove quick  ## what every change must pass
 	@echo 'check: all passed'
 
 promises: $(SETUP)  ## what the project promises of its code: units, latencies, imports, tests, types
@@ -70,7 +70,7 @@ build/lint/%.ok: %.sv $(RTL) rtl/cpu/picorv32.vlt Makefile | $(SETUP)
 
 prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a path
 	$(call say,proofs)
-	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
+	@$(PYTHON) -m tools.prove $(if $K,-k '$K') -j $(JOBS)
 
 LATE       := tables/commands.py tables/modules.py tables/readme_figures.py # read what others make
 GENERATORS := $(filter-out tables/__init__.py tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)

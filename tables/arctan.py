@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from tables import made_files
+from tables.made_files import ROOT
 
 PHASE = 16  # bits of a phase; 2^PHASE = one period
 INDEX = 7  # bits of the ratio that choose the chord
@@ -36,7 +37,7 @@ DOWN = CUT + SAG - UP
 BOUND = 0.5 + max(UP, DOWN) + 0.5 / (1 << GUARD)
 
 BASE_BITS, SLOPE_BITS = max(BASE).bit_length(), max(SLOPE).bit_length()
-FOLDER = Path(__file__).resolve().parent.parent / "rtl" / "interpolate"
+FOLDER = ROOT / "rtl" / "interpolate"
 MADE = FOLDER / "arctan_rom.sv"
 BEGIN = "    // made by tables/arctan.py, not to be edited"
 END = "    // end of the made constants"

@@ -17,6 +17,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from tables import made_files
+from tables.made_files import ROOT
 
 PHASE = 16  # bits of a phase; 2^PHASE = one turn
 UNIT = 48  # the made angles are in 2^-UNIT turn
@@ -55,7 +56,7 @@ def angles_by_hand() -> tuple[list[int], int]:
 
 
 ANGLE, RADIAN = angles_by_hand()
-FOLDER = Path(__file__).resolve().parent.parent / "rtl" / "interpolate"
+FOLDER = ROOT / "rtl" / "interpolate"
 MADE = FOLDER / "arctan_rotation_rom.sv"
 BEGIN = "    // made by tables/arctan_rotation.py, not to be edited"
 END = "    // end of the made constants"

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tables import made_files, registers
+from tables.made_files import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "bus.toml"
 HEADER = ROOT / "sw" / "firmware" / "made" / "bus_protocol.h"
 HOST = ROOT / "sw" / "host" / "moire" / "made" / "bus_tables.py"

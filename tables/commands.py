@@ -12,8 +12,8 @@ from moire.cli.command_line import moire
 from moire.cli.options import COMMON, Common
 from moire.cli.parser import EXAMPLES, SECTIONS, Command, Group, Several
 from tables import made_files
+from tables.made_files import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "commands"
 
 Shown = Command | Group

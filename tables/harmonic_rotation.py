@@ -7,13 +7,13 @@ Rotation n turns by atan(2^-n), so that it needs only shifts and additions (CORD
 
 import sys
 from fractions import Fraction
-from pathlib import Path
 
 from tables import made_files
+from tables.made_files import ROOT
 
 UNIT = 32  # the made angles are in 2^-UNIT turn
 COUNT = 24  # rotations
-MADE = Path(__file__).resolve().parent.parent / "rtl" / "compensate" / "harmonic_rotation_rom.sv"
+MADE = ROOT / "rtl" / "compensate" / "harmonic_rotation_rom.sv"
 
 
 def arctan(inverse: int) -> Fraction:

@@ -6,11 +6,10 @@ sw/firmware/station/job/job.c, and check the rules that the table must keep.
 import re
 import sys
 import tomllib
-from pathlib import Path
 
 from tables import made_files
+from tables.made_files import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "sw" / "firmware" / "station" / "job" / "job.c"
 BUS = ROOT / "tables" / "bus.toml"
 PAGE = ROOT / "docs" / "job.md"

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 from tables import made_files
+from tables.made_files import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "rtl" / "README.md"
 BEGIN, END = "<!-- modules -->", "<!-- /modules -->"
 COLUMNS = ["directory", "module", "purpose", "latency", "model and test"]

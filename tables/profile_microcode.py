@@ -10,11 +10,11 @@ the sign of the sum of the line before.
 
 import re
 import sys
-from pathlib import Path
 
 from tables import made_files
+from tables.made_files import ROOT
 
-MADE = Path(__file__).resolve().parent.parent / "rtl" / "control" / "profile_microcode.sv"
+MADE = ROOT / "rtl" / "control" / "profile_microcode.sv"
 
 # Words of the player's memory. The names in SHARED mean one of two words: that of a controlled
 # stop, or that of the ramp of the rate.

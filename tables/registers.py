@@ -19,8 +19,8 @@ from systemrdl.messages import RDLCompileError
 from systemrdl.node import AddressableNode, FieldNode, Node, RegNode
 
 from tables import made_files
+from tables.made_files import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "registers.rdl"
 REGISTER_BUS_BASE = 0x8000_0000  # where the soft core sees the map
 SLOT = 0x100  # bytes that a block may fill: a word index inside it has 6 bits

@@ -5,7 +5,9 @@
   import each other without a cycle, deferred imports included;
 - nothing outside tb imports from tb, and moire imports none of the others;
 - nothing patches sys.path or loads a file by an import spec;
-- C and C++: a module is x.c with x.h; modules include each other without a cycle.
+- C and C++: a module is x.c with x.h; modules include each other without a cycle;
+- firmware: a module includes only modules of its own and of lower layers, and the directories of
+  the station include each other without a cycle.
 
     python -m tools.check_imports        lists what breaks a rule; exit code 1 when there is any
 """
@@ -18,7 +20,8 @@ from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from tools import ROOT
+
 PACKAGES = {
     "moire": "sw/host/moire",
     "twin": "sw/twin",
@@ -31,6 +34,9 @@ PACKAGES = {
     "tb": "tb",
 }
 C_ROOTS = ("sw/firmware", "sw/twin")
+FIRMWARE = "sw/firmware/"
+LAYERS = ("made", "core", "planner", "axis", "bus", "calibration", "station", "images")
+BESIDE = {"calibration", "station"}  # neither includes the other
 HIDDEN = re.compile(r"\bsys\.path(\[|\.| *\+?=)|\bspec_from_file_location\b")
 
 Graph = dict[str, set[str]]
@@ -129,6 +135,29 @@ def cycles(graph: Graph) -> list[str]:
             return found
 
 
+def wrong_layers(graph: Graph) -> list[str]:
+    """Includes of the firmware that lead to a higher layer, and cycles of the directories of the
+    station; graph: see c_graph.
+    """
+    found: list[str] = []
+    directories: Graph = {}
+    firmware = {
+        name.removeprefix(FIRMWARE): {other.removeprefix(FIRMWARE) for other in others}
+        for name, others in sorted(graph.items())
+        if name.startswith(FIRMWARE)
+    }
+    for name, others in firmware.items():
+        layer, directory = name.partition("/")[0], name.rpartition("/")[0]
+        for other in sorted(others):
+            below = other.partition("/")[0]
+            if LAYERS.index(below) > LAYERS.index(layer) or {below, layer} == BESIDE:
+                found.append(f"{FIRMWARE}{name} must not include {other}")
+        if layer == "station":
+            above = {other.rpartition("/")[0] for other in others} - {directory}
+            directories.setdefault(directory, set()).update(above)
+    return [*found, *cycles(directories)]
+
+
 def wrong_ways(graph: Graph) -> list[str]:
     """Imports from tb outside tb, and imports of the workshop by the host package."""
     found = []
@@ -154,8 +183,14 @@ def hidden_imports() -> list[str]:
 
 def problems() -> list[str]:
     """Everything that breaks a rule."""
-    graph = python_graph()
-    return [*cycles(graph), *cycles(c_graph()), *wrong_ways(graph), *hidden_imports()]
+    python, c = python_graph(), c_graph()
+    return [
+        *cycles(python),
+        *wrong_ways(python),
+        *hidden_imports(),
+        *cycles(c),
+        *wrong_layers(c),
+    ]
 
 
 def main() -> int:

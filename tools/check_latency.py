@@ -14,8 +14,8 @@ import sys
 from pathlib import Path
 
 from tables import modules
+from tools import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 NO_CLAIM = re.compile(r"(see|none)\b")
 
 

@@ -11,7 +11,8 @@ import re
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from tools import ROOT
+
 NEEDS_NONE = {"clk", "rst"}
 DECLARATION = re.compile(r"\s*(?:input|output|inout|parameter)\b")
 NAME = re.compile(r"(\w+)\s*(?:=[^,/]*)?,?\s*$")

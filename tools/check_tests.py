@@ -7,7 +7,7 @@
   must call a function of its file or of its imports under tb/ that has one;
 - asserts a constant.
 
-    python tools/check_tests.py [FILE …]          exit code 1 when there is any
+    python -m tools.check_tests [FILE …]          exit code 1 when there is any
 """
 
 import argparse
@@ -16,7 +16,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from tools import ROOT
+
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 CHECKS = {"raises", "fail", "warns"}  # of pytest: calls that fail where a value is wrong

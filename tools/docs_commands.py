@@ -30,7 +30,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from tools import ROOT
+
 PROGRAMS = ROOT / "build" / "venv" / "bin"
 COMMAND = re.compile(r"(moire|make|export|pip|build/venv/bin/\w+)\b")
 HARDWARE = re.compile(r"/dev/ttyUSB0|COM3|socket://127\.0\.0\.1:2218")

@@ -2,7 +2,7 @@
 """Proves the properties of every module that carries some (`ifdef FORMAL`): base case, induction,
 and that every cover is met.
 
-python tools/prove.py [-k WORDS] [-j N] [-f]        -k only modules whose path has the words, -f
+python -m tools.prove [-k WORDS] [-j N] [-f]        -k only modules whose path has the words, -f
                                                     also what is proved already
 
 A header line `// proof    depth 40, W = 4, DEPTH = 8` sets the depth (20 without it) and parameters
@@ -24,7 +24,8 @@ from pathlib import Path
 
 import pythondata_cpu_picorv32  # type: ignore[import-untyped]
 
-ROOT = Path(__file__).resolve().parent.parent
+from tools import ROOT
+
 BUILD = ROOT / "build" / "prove"
 CORE = Path(pythondata_cpu_picorv32.data_location) / "picorv32.v"  # the one module that is not ours
 SOLVER = "yices"

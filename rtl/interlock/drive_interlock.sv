@@ -52,8 +52,9 @@ module drive_interlock (
     output logic               block_down         // level: no negative command passes
 );
     // Of several causes in the same cycle, first_fault takes the lowest bit.
-    // Of several causes in the same cycle, first_fault takes the lowest bit.
-    localparam [9:0] LATCH_ALWAYS = 10'b00_1100_0100;  // cpu, drive, estop
+    // made by tables/interlock_faults.py, not to be edited
+    localparam [9:0] LATCH_ALWAYS = 10'b0011000100;  // estop, drive, cpu
+    // end of the made constants
 
     // the last error that counted was above the limit
     logic too_far;

@@ -26,12 +26,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.s0_stage import ADDRESSES, POLL_S, ROOT, Stage, random_moves, table
+from experiments.report_page import ROOT
+from experiments.s0_stage import ADDRESSES, POLL_S, Stage, random_moves, table
 from moire.analysis import report
 from moire.client.bus import Bus
 from moire.client.records import CalibrationState
 from moire.errors import MoireError
-from twin import START_S, BuildError, Twin, TwinTransport
+from twin import BuildError, Twin, TwinTransport
 from twin.machines.machine import MachineHandle, Trace
 from twin.nodes.twin import drives
 
@@ -69,7 +70,7 @@ class FineStage(Stage):
             node_parameters=NODE,
         )
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
-        bus.transport.wait(START_S)
+        twin.run_until_ready()
         return cls(twin, bus, {name: bus.axis(ADDRESSES[name]) for name in names})
 
     def calibrate_ellipse(self, name: str) -> CalibrationState:

@@ -22,14 +22,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from experiments.report_page import ROOT
 from moire.analysis import report
 from moire.client.axis import Axis
 from moire.client.bus import Bus
 from moire.client.records import Identity, Status
 from moire.errors import MoireError
-from twin import START_S, BuildError, Twin, TwinTransport
+from twin import BuildError, Twin, TwinTransport
 
-ROOT = Path(__file__).resolve().parents[2]
 ADDRESSES = {"X": 1, "Y": 2}  # on the bus; the axes of the twin have the same order
 PERIOD_NM = 800.0
 POLL_S = 0.005  # between two polls of a motion
@@ -55,7 +55,7 @@ class Stage:
         """The machine after power-up; `plant` overrides parameters of its model."""
         twin = Twin(seed=seed, nodes=tuple(ADDRESSES.values()), plant=plant)
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
-        bus.transport.wait(START_S)
+        twin.run_until_ready()
         return cls(twin, bus, {})
 
     def find(self) -> list[Identity]:

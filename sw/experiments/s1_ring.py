@@ -25,6 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments import report_page
+from experiments.report_page import ROOT
 from moire.analysis import report
 from moire.analysis.harmonic_fit import Harmonics, Readings, fit, read_readings
 from moire.bus.transport import BITS, Transport
@@ -34,7 +35,6 @@ from twin import BuildError
 from twin.build import simulation
 from twin.machines.ring import ARC_SECOND, RotaryRing
 
-ROOT = Path(__file__).resolve().parents[2]
 DRIVER, RELAY = Path(__file__).with_name("relay_serve.cpp"), ROOT / "rtl" / "relay.sv"
 HARMONIC_DRIVER = Path(__file__).with_name("harmonic_run.cpp")
 HARMONIC_MAP = ROOT / "rtl" / "compensate" / "harmonic_map.sv"

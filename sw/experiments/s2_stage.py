@@ -33,7 +33,7 @@ from moire.client.bus import Bus
 from moire.client.records import Status
 from moire.errors import MoireError
 from moire.units import Value
-from twin import START_S, BuildError, Twin, TwinTransport
+from twin import BuildError, Twin, TwinTransport
 from twin.nodes.twin import Axis, Node, drives
 
 CLK_HZ = 3_000_000
@@ -169,7 +169,7 @@ class Stage:
             node_parameters=NODE,
         )
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
-        bus.transport.wait(START_S)
+        twin.run_until_ready()
         stage = cls(twin, bus, {name: bus.axis(1, number) for number, name in enumerate(SCALES)})
         for name, scale in SCALES.items():
             for parameter, value in scale.settings().items():

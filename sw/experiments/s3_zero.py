@@ -28,7 +28,7 @@ from moire.client.bus import Bus
 from moire.client.records import Status
 from moire.errors import MoireError
 from moire.units import Value
-from twin import START_S, BuildError, Twin, TwinTransport
+from twin import BuildError, Twin, TwinTransport
 from twin.machines.machine import Trace
 from twin.nodes.twin import Axis, Node, drives
 from twin.parameters import tables as parameters
@@ -119,7 +119,7 @@ class Motor:
             node_parameters=NODE,
         )
         self.bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed), poll_s=POLL_S)
-        self.bus.transport.wait(START_S)
+        self.twin.run_until_ready()
         self.axis = self.bus.axis(1)
         for name, value in {**SETTINGS, **servo(), **(settings or {})}.items():
             self.axis.set_parameter(name, value)

@@ -39,7 +39,7 @@ from moire.client.nonvolatile import SavedSettings
 from moire.client.settings import Settings
 from moire.errors import MoireError
 from moire.units import Value
-from twin import START_S, Axis, BuildError, Devices, Node, Twin, TwinTransport, build
+from twin import Axis, BuildError, Devices, Node, Twin, TwinTransport, build
 from twin.nodes.twin import drives
 
 MAIN, SUB = 0, 1  # numbers of the nodes in the twin
@@ -124,7 +124,7 @@ class Cut:
     angle: float
     error: float  # arcsec
     start_s: float
-    whole: bool
+    complete: bool
 
 
 @dataclass
@@ -145,7 +145,7 @@ class Outcome:
     def uncut(self) -> list[int]:
         """The stations without a complete cut."""
         return sorted(
-            set(range(len(self.stations))) - {cut.station for cut in self.cuts if cut.whole}
+            set(range(len(self.stations))) - {cut.station for cut in self.cuts if cut.complete}
         )
 
     @property
@@ -162,7 +162,7 @@ class Outcome:
         return [cut for cut in self.cuts if cut.station is None]
 
     @property
-    def whole(self) -> bool:
+    def complete(self) -> bool:
         """Whether each station was cut once, nothing else was cut, and the job has finished."""
         return (
             not (self.uncut or self.twice or self.outside_tolerance)
@@ -176,8 +176,8 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether the job is not whole, or a cut is outside the tolerance."""
-        return not self.whole or self.worst > TOLERANCE
+        """Whether the job is not complete, or a cut is outside the tolerance."""
+        return not self.complete or self.worst > TOLERANCE
 
     @property
     def words(self) -> str:
@@ -247,7 +247,7 @@ class IndexingMachine:
         self.source, self.stations = random.Random(seed), list[float]()
         self.table_dark_s: list[float] = []
         self.twin.set_position(SUB, math.radians(self.source.uniform(0, ABOUT)))
-        self.twin.run(START_S)
+        self.twin.run_until_ready()
         for name, value in {
             "peer_mode": mode,
             "peer_role": "main",
@@ -326,7 +326,7 @@ class IndexingMachine:
             return "RESUME"
         return (
             "NEXT"
-            if any(cut.station == state.station and cut.whole for cut in self.cuts())
+            if any(cut.station == state.station and cut.complete for cut in self.cuts())
             else "AGAIN"
         )
 
@@ -366,7 +366,7 @@ class IndexingMachine:
                     angle,
                     error,
                     cut.start_s,
-                    cut.whole,
+                    cut.complete,
                 )
             )
         return found
@@ -380,7 +380,7 @@ class IndexingMachine:
         self.twin.run(DARK_S)
         for node in dark:
             self.twin.power_on(node)
-        self.twin.run(START_S)
+        self.twin.run_until_ready()
 
     def run(
         self, trouble: Trouble = CALM, watch: Callable[[JobState], object] | None = None

@@ -6,11 +6,11 @@ large it becomes.
 from functools import cache
 from pathlib import Path
 
-from figures.common import Figure, Quick, console
+from figures.common import ROOT, Figure, Quick, console
 from figures.synthesis import ELABORATED, elaborated, source_of, synthesise
 from twin.build import run, simulation
 
-ARCTAN = Path(__file__).resolve().parents[2] / "rtl" / "interpolate" / "arctan_pipelined.sv"
+ARCTAN = ROOT / "rtl" / "interpolate" / "arctan_pipelined.sv"
 SWEEP = Path(__file__).with_name("arctan_sweep.cpp")
 SEED = 1  # of the placement; not picked, others are within 5 % of it
 

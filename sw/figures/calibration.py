@@ -21,7 +21,7 @@ from moire.client.axis import CORRECTION
 from moire.client.bus import Bus
 from moire.client.records import CalibrationState
 from moire.made.bus_tables import CALIBRATION_REASONS
-from twin import START_S, Twin, TwinTransport
+from twin import Twin, TwinTransport
 from twin.compiled import calibration as compiled
 from twin.compiled.calibration import PHASES, SAMPLES, CalibrationRun
 from twin.parameters import tables as parameters
@@ -327,7 +327,7 @@ def twin_sde_nm(complete: bool = True, seed: int = 1) -> float:
     left: dict[int, float] = {}  # nm by how much was accepted: nothing, the ellipse, the harmonics
     with Twin(nodes=(1,), plant=HARMONICS_OF_TWIN) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed))
-        bus.transport.wait(START_S)
+        twin.run_until_ready()
         axis = bus.axis(1)
         axis.enable()
         axis.home()

@@ -8,11 +8,11 @@ The campaign of 10^9 edges is `make soak K=decoder`.
 from functools import cache
 from pathlib import Path
 
-from figures.common import Figure, Quick, bar, console, seeds, shares
+from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, elaborated, source_of, synthesise_ice40
 from twin.build import run, simulation
 
-ENCODER = Path(__file__).resolve().parents[2] / "rtl" / "decode" / "incremental_encoder.sv"
+ENCODER = ROOT / "rtl" / "decode" / "incremental_encoder.sv"
 DRIVER = Path(__file__).with_name("encoder_run.cpp")
 EDGES = 10**7
 SHARE = 10**6  # edges of one run, each with a seed of its own

@@ -19,16 +19,14 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from importlib import import_module
 from multiprocessing import get_context
-from pathlib import Path
 
 from figures import record
-from figures.common import Figure, collected, console, modules
+from figures.common import ROOT, Figure, collected, console, modules
 from figures.comparison import page
 from figures.synthesis import SynthesisError
 from moire.errors import MoireError
 from twin import BuildError
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "build" / "report" / "figures.html"
 PROCESSES = 2
 LONG = ("s4", "s0", "fine", "bus", "calibration", "profile")  # modules that take longest: first

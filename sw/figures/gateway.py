@@ -17,14 +17,13 @@ from typing import NamedTuple
 
 import serial
 
-from figures.common import Figure, Quick, console
+from figures.common import ROOT, Figure, Quick, console
 from firmware import build as firmware_build
 from fuzz import parser_fuzz
 from moire.bus import cobs
 from moire.bus.protocol import parse_reply, request_body
 from moire.errors import MoireError
 
-ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "sw" / "firmware"
 READ_S = 10
 START_S = 3  # of reads that do not count: the firmware starts, and loads its tables

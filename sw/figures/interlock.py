@@ -14,14 +14,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from figures.common import Figure, Quick, bar, console, shares
+from figures.common import ROOT, Figure, Quick, bar, console, shares
 from firmware import build as firmware_build
 from moire import Bus
 from moire.client.axis import Axis as BusAxis
 from moire.errors import BusError, Refused
-from twin import START_S, Axis, Node, Twin, TwinTransport, build
+from twin import Axis, Node, Twin, TwinTransport, build
 
-ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("interlock_run.cpp")
 FAULTS = 10**4
 NODE_FAULTS, CORE_FAULTS = 200, 100  # of them: in the whole node; in its soft core
@@ -84,7 +83,7 @@ def powered_up(
         node_parameters={"FILTERS": 0},
         firmware=firmware,
     )
-    twin.run(START_S)
+    twin.run_until_ready()
     axis = Bus(TwinTransport(twin)).axis(1)
     axis.enable()
     return twin, axis

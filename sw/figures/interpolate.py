@@ -5,12 +5,12 @@ large it is.
 
 from pathlib import Path
 
-from figures.common import Figure, Quick, console
+from figures.common import ROOT, Figure, Quick, console
 from figures.synthesis import ECP5, ECP5_CELLS, ELABORATED, elaborated, netlist_of, placed
 from twin.build import run, simulation
 
 HERE = Path(__file__).resolve().parent
-CHANNEL = HERE.parents[1] / "rtl" / "feedback_channel.sv"
+CHANNEL = ROOT / "rtl" / "feedback_channel.sv"
 DRIVER = HERE / "interpolate_latency.cpp"
 BENCH = HERE / "interpolator_bench.sv"
 SEED = 1  # of the placement

@@ -31,7 +31,6 @@ from figures.calibration import (
 from figures.common import Figure, Quick, console
 from twin.build import run, simulation
 
-ROOT = Path(__file__).resolve().parents[2]
 BENCH = Path(__file__).with_name("legacy_bench.sv")
 DRIVER = Path(__file__).with_name("legacy_run.cpp")
 SEED = 1

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import ruckig  # type: ignore[import-not-found]
 
-from figures.common import Figure, Quick, bar, console, shares
+from figures.common import ROOT, Figure, Quick, bar, console, shares
 from twin.build import (
     COMPILE,
     VERILATED,
@@ -25,7 +25,6 @@ from twin.build import (
 )
 from twin.compiled.firmware import Limits, Plan, Segment, library
 
-ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("profile_run.cpp")
 BENCH = Path(__file__).with_name("profile_player_bench.sv")
 FIRMWARE = ROOT / "sw" / "firmware"

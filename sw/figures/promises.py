@@ -9,10 +9,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from figures.common import Figure, Quick, bar, console
+from figures.common import ROOT, Figure, Quick, bar, console
 from tools import check_imports, check_latency, check_ports, check_types, docs_commands
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def listed(problems: list[str]) -> int:

@@ -11,11 +11,10 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from figures.common import Figure, Quick, bar, console, seeds, shares
+from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
 from twin import BuildError
 from twin.build import run, simulation
 
-ROOT = Path(__file__).resolve().parents[2]
 PASS = ROOT / "rtl" / "peripheral" / "ps2_pass.sv"
 DRIVER = Path(__file__).with_name("ps2_run.cpp")
 RECORDING = ROOT.parent / "shared" / "captures" / "ps2_keyboard_asdfgh.csv"

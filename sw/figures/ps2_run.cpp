@@ -116,7 +116,7 @@ struct Host {
     double rest = 0;  // us that it is held low after each byte
     bool clock_low = false, data_low = false;
     std::deque<uint8_t> orders;
-    std::vector<uint8_t> heard;
+    std::vector<uint8_t> received;
     int64_t eleventh = 0;
     uint64_t damaged = 0, unanswered = 0, cuts = 0;
     bool idle() const { return state == LISTEN && places == 0 && orders.empty(); }
@@ -181,7 +181,7 @@ struct Host {
         if (!whole)
             damaged++, orders.push_front(0xFE);
         else {
-            heard.push_back(byte);
+            received.push_back(byte);
             if (rest > 0) then(BEFORE_PULL, 60), pull_us = rest;
         }
     }
@@ -236,9 +236,9 @@ struct Judge {
     size_t seen = 0, place = 0;
     uint64_t wrong = 0, bytes = 0, injections = 0, answers = 0;
     bool border = true;
-    void judge(const std::vector<uint8_t>& heard) {
-        for (; seen < heard.size(); seen++) {
-            const uint8_t byte = heard[seen];
+    void judge(const std::vector<uint8_t>& received) {
+        for (; seen < received.size(); seen++) {
+            const uint8_t byte = received[seen];
             bytes++;
             if (byte == 0xFA || byte == 0xEE)
                 answers++;
@@ -292,12 +292,12 @@ int sequences(int count, uint64_t seed) {
         }
         bench.wait(bench.random.between(0, bench.random.below(2) ? 60'000 : 4'000));
         for (int ms = 0; ms < 200 && judge.answers < orders; ms++)  // the host waits for its answer
-            bench.wait(1'000), judge.judge(bench.host.heard);
-        judge.judge(bench.host.heard);
+            bench.wait(1'000), judge.judge(bench.host.received);
+        judge.judge(bench.host.received);
     }
     bench.host.cut = 0;
     bench.wait(1'500'000);
-    judge.judge(bench.host.heard);
+    judge.judge(bench.host.received);
     uint64_t wrong =
         judge.wrong + judge.expected.size() + bench.host.damaged + bench.host.unanswered;
     wrong += started - judge.injections + (ordered != bench.keyboard.commands) +
@@ -316,9 +316,9 @@ int delay(int count, uint64_t seed) {
     for (int n = 0; n < count; n++) {
         bench.keyboard.half = bench.random.between(30, 50);
         bench.keyboard.keys.push_back(uint8_t(0x15 + bench.random.below(8) * 8));
-        const size_t before = bench.host.heard.size();
-        for (int ms = 0; ms < 20 && bench.host.heard.size() == before; ms++) bench.wait(1'000);
-        if (bench.host.heard.size() == before) return std::puts("1e9 us"), 0;
+        const size_t before = bench.host.received.size();
+        for (int ms = 0; ms < 20 && bench.host.received.size() == before; ms++) bench.wait(1'000);
+        if (bench.host.received.size() == before) return std::puts("1e9 us"), 0;
         longest =
             std::max(longest, double(bench.host.eleventh - bench.keyboard.eleventh) / US - 10 * 80);
         bench.wait(bench.random.between(0, 3'000));
@@ -345,20 +345,20 @@ int wave(const char* recording, int count, uint64_t seed, const char* file) {
     }
     bench.wait(20'000);
     Judge judge;
-    judge.seen = bench.host.heard.size();
+    judge.seen = bench.host.received.size();
     for (int n = 0; n < count; n++) {
         type(bench, judge);
         if (bench.injection.empty() && bench.random.below(3) == 0)
             bench.injection.assign(START.begin(), START.end());
         bench.wait(bench.random.between(0, 50'000));
-        judge.judge(bench.host.heard);
+        judge.judge(bench.host.received);
     }
     bench.wait(500'000);
-    judge.judge(bench.host.heard);
+    judge.judge(bench.host.received);
     std::ofstream(file, std::ios::binary) << bench.samples;
     std::printf("%llu\n",
                 (unsigned long long)(judge.wrong + judge.expected.size() + bench.host.damaged));
-    for (uint8_t byte : bench.host.heard) std::printf("%02x ", byte);
+    for (uint8_t byte : bench.host.received) std::printf("%02x ", byte);
     std::puts("");
     return 0;
 }

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
-from figures.common import Figure
+from figures.common import ROOT, Figure
 
-RECORD = Path(__file__).resolve().parents[2] / "docs" / "figures.toml"
+RECORD = ROOT / "docs" / "figures.toml"
 HEAD = """\
 # SPDX-License-Identifier: Apache-2.0
 # What each figure was when it was measured last. Written by `make figures` and `make figure NAME=…`

@@ -10,11 +10,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from figures.common import Figure, Quick, bar, console, seeds, shares
+from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, elaborated, netlist_of, placed, source_of
 from twin.build import run, simulation
 
-RELAY = Path(__file__).resolve().parents[2] / "rtl" / "relay.sv"
+RELAY = ROOT / "rtl" / "relay.sv"
 DRIVER = Path(__file__).with_name("relay_run.cpp")
 AS_MEASURED: dict[str, Any] = {
     "K": 16,

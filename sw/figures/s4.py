@@ -15,7 +15,7 @@ from experiments import s4_job
 from figures.common import Figure, Quick, bar, console, seeds
 from moire.client.bus import Bus
 from moire.client.indexing_table import IndexingTable
-from twin import START_S, Axis, Node, Twin, TwinTransport, build
+from twin import Axis, Node, Twin, TwinTransport, build
 
 PROCESSES = 2
 JOBS = 20
@@ -46,7 +46,7 @@ def indexed(seed: int, stations: int = STATIONS) -> float:
             TwinTransport(twin), random_source=random.Random(seed), poll_s=s4_job.POLL_S
         ).node(1)
         twin.set_position(0, math.radians(source.uniform(0, s4_job.ABOUT)))
-        twin.run(START_S)
+        twin.run_until_ready()
         s4_job.set_up_table(node)
         errors = []
         for station in s4_job.random_stations(stations, source):

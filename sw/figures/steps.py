@@ -8,11 +8,10 @@ The campaign of 10^8 reversals is `make soak K=steps`.
 from functools import cache
 from pathlib import Path
 
-from figures.common import Figure, Quick, bar, console, seeds, shares
+from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, elaborated, synthesise_ice40
 from twin.build import run, simulation
 
-ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("steps_run.cpp")
 SOURCE = ROOT / "rtl" / "drive" / "step_generator.sv"
 REVERSALS = 10**6

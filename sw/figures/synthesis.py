@@ -15,9 +15,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from figures.common import Quick
+from figures.common import ROOT, Quick
 
-ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "synthesis"
 PADS = 150  # an inner block has more ports than the ECP5 has pads: it is placed without any
 ECP5 = ["--25k", "--package", "CABGA256", "--speed", "6"]  # LFE5U-25F-6

@@ -6,7 +6,7 @@ Everything lies under build/twin/<hash of all that goes in>, so nothing is built
 is no part of it: it
 is written into the nodes' memory when a twin is made.
 
-    python -m twin.build          builds both libraries and the firmware, says where they are
+    python -m twin.build          builds both libraries and the firmware, and prints their paths
 """
 
 import fcntl
@@ -73,11 +73,11 @@ OWN = [
 
 
 class BuildError(Exception):
-    """One line that says what is missing or what went wrong."""
+    """One line that states what is missing or what failed."""
 
 
 def package(name: str, why: str) -> Path:
-    """Folder of an installed package; BuildError says why it is needed."""
+    """Folder of an installed package; BuildError states why it is needed."""
     spec = find_spec(name)
     if not spec or not spec.submodule_search_locations:
         raise BuildError(
@@ -96,7 +96,7 @@ def compiler() -> str:
     return found
 
 
-def say(text: str) -> None:
+def report(text: str) -> None:
     """Report progress on standard error."""
     print(f"twin: {text}", file=sys.stderr, flush=True)
 
@@ -188,8 +188,8 @@ def machine_library() -> Path:
 
 def rtl_path() -> list[Path]:
     """Every folder in which a module is found by its name."""
-    rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
-    return rooms + [package(CORE_PACKAGE, "the soft core") / "verilog"]
+    directories = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
+    return directories + [package(CORE_PACKAGE, "the soft core") / "verilog"]
 
 
 def runtime(tool: str, verilator: Path) -> Path:
@@ -384,7 +384,7 @@ def twin_library(
     if (folder / "libtwin.so").exists():
         return folder / "libtwin.so"
     start = time.monotonic()
-    say(
+    report(
         f"building {folder.relative_to(ROOT)} "
         f"(clk {clk_hz} Hz, {axes} {'axis' if axes == 1 else 'axes'} a node)"
     )
@@ -393,7 +393,7 @@ def twin_library(
     def make(folder: Path) -> None:
         (folder / "parameters.h").write_text(parameters.header())
         verilate_node(folder, verilator, clk_hz, axes, node or {})
-        say(f"verilated after {time.monotonic() - start:.0f} s")
+        report(f"verilated after {time.monotonic() - start:.0f} s")
         include = [f"-I{folder}", f"-I{HERE}", f"-I{verilator / 'include'}"]
         jobs = [(TWIN, [*COMPILE, *VERILATED])] + [
             (file, [*OWN, "-fvisibility=hidden"]) for file in (*machine_sources(), BUS)
@@ -422,7 +422,7 @@ def twin_library(
         )
 
     library = made_once(folder, "libtwin.so", make)
-    say(f"built after {time.monotonic() - start:.0f} s")
+    report(f"built after {time.monotonic() - start:.0f} s")
     return library
 
 

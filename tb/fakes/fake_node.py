@@ -83,7 +83,7 @@ class FakeAxis:
         return self.parameters[67] / 65536
 
     def go(self, kind, now, seconds, target=None):
-        """Begins a motion that takes so long at full speed."""
+        """Begins a motion that takes this time at full speed."""
         self.kind, self.begin, self.ended = kind, now, "running"
         self.start, self.target = self.position, self.target if target is None else target
         self.full_speed_s = seconds
@@ -445,9 +445,15 @@ class FakeNode:
         }
 
     def do_segments(self, axis):
-        use, whole = axis.parameters[90], len(axis.points) > axis.parameters[87]
+        use, complete = axis.parameters[90], len(axis.points) > axis.parameters[87]
         reason = (
-            "ok" if not use else "no_segments" if not whole else "ok" if axis.homed else "not_homed"
+            "ok"
+            if not use
+            else "no_segments"
+            if not complete
+            else "ok"
+            if axis.homed
+            else "not_homed"
         )
         if not self.most_segments:
             return "not_built", {}
@@ -533,9 +539,9 @@ class FakeBus(Transport):
     def send(self, words):
         for word in words:
             self.pass_time(self.character_s)
-            for heard in self.to_node(word):
+            for received in self.to_node(word):
                 answers = [
-                    node.receive_word(heard) if node.baud == self.baud else []
+                    node.receive_word(received) if node.baud == self.baud else []
                     for node in self.nodes
                 ]
                 if self.wired_and:

@@ -18,15 +18,15 @@ class FakeNodeBus(Transport):
     def send(self, words):
         passed = []
         for word, after in zip(words, [*words[1:], 0x100], strict=True):
-            whole = (
+            complete = (
                 not word >> 8 and after >> 8
             )  # the hardware marks the last word of a right frame
             passed.append(
                 word & 0xFF
                 | DEFINES["BUS_RECEIVE_COMMAND_MASK"] * (word >> 8)
-                | DEFINES["BUS_RECEIVE_GOOD_MASK"] * whole
+                | DEFINES["BUS_RECEIVE_GOOD_MASK"] * complete
             )
-        self.sent += self.machine.hear(passed)
+        self.sent += self.machine.receive(passed)
         self.wait(0.001)
 
     def receive(self, count, timeout_s):

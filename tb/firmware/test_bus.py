@@ -8,7 +8,7 @@ import pytest
 
 from tables.bus import register_fields
 from tb.bench import seed
-from twin.compiled.host_library import ROOT
+from twin.build import ROOT
 from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, FakeNode
 
 COMMAND = DEFINES["BUS_RECEIVE_COMMAND_MASK"]
@@ -44,12 +44,12 @@ def test_before_any_request_the_reply_is_ok_of_sequence_0():
 
 def test_a_known_exchange_byte_by_byte():
     machine = FakeNode(address=2)
-    sent = machine.hear([0x22 | COMMAND])
+    sent = machine.receive([0x22 | COMMAND])
     assert sent == b"\x62"
     frame = bytes([2, 7, OPERATION["counters"]])
     crc = zlib.crc32(b"\x22" + frame).to_bytes(4, "little")
-    assert machine.hear([*frame, *crc[:3], crc[3] | GOOD]) == b""
-    answer = machine.hear([0x12 | COMMAND])
+    assert machine.receive([*frame, *crc[:3], crc[3] | GOOD]) == b""
+    answer = machine.receive([0x12 | COMMAND])
     body = bytes([7, OPERATION["counters"], 0]) + bytes(40)
     assert answer == b"\x52" + bytes([43]) + body + zlib.crc32(
         b"\x52" + bytes([43]) + body
@@ -127,13 +127,13 @@ def test_frames_that_the_hardware_did_not_mark_good_change_nothing():
     machine.ask("identify")
     before = machine.reply()
     words = machine.frame(example("set_parameter", parameter=PARAMETER["kp"]["id"], value=5))
-    machine.hear([word & ~GOOD for word in words])
+    machine.receive([word & ~GOOD for word in words])
     assert machine.reply() == before
-    machine.hear(words[:5])  # incomplete
-    machine.hear(
+    machine.receive(words[:5])  # incomplete
+    machine.receive(
         [word | GOOD for word in words[5:7]]
     )  # marked good, but shorter than its length: not a frame
-    machine.hear([words[0], *[200] * 200])  # much longer than any frame
+    machine.receive([words[0], *[200] * 200])  # much longer than any frame
     assert (
         machine.reply() == before
         and machine.axes[0].word[DEFINES["AXIS_KP"]] == PARAMETER["kp"]["default"]
@@ -144,7 +144,7 @@ def test_nonsense_on_the_bus_never_stops_the_node():
     draw = random.Random(seed())
     machine = FakeNode()
     for _ in range(300):
-        machine.hear(
+        machine.receive(
             [
                 draw.getrandbits(10) if draw.random() < 0.5 else draw.getrandbits(8)
                 for _ in range(draw.randrange(100))

@@ -290,7 +290,7 @@ def sync(machine):
         axis.player.moving |= bool(
             machine.word[line + DEFINES["BUS_SYNC_AXES"]] >> n & 1 and axis.player.queue
         )
-    return machine.hear(
+    return machine.receive(
         [
             0x20 | DEFINES["BUS_RECEIVE_COMMAND_MASK"],
             1,

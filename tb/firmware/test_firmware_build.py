@@ -2,7 +2,6 @@
 """build.py: what it makes, when it makes it, and how it reports that it cannot."""
 
 import os
-import re
 import struct
 import subprocess
 import sys
@@ -10,7 +9,7 @@ import sys
 import pytest
 
 from firmware import build as firmware_build
-from twin.compiled.host_library import FIRMWARE
+from twin.build import FIRMWARE
 
 MEMORY = 98304
 
@@ -104,42 +103,3 @@ def test_two_sources_of_the_same_stem_are_refused(tmp_path):
         firmware_build.sources_of("axis", tmp_path)
     (tmp_path / "axis" / "clock.c").unlink()
     assert len(firmware_build.sources_of("axis", tmp_path)) == 2
-
-
-LAYERS = ["made", "core", "planner", "axis", "bus", "calibration", "station", "images"]
-BESIDE = {"calibration", "station"}  # neither includes the other
-
-
-def includes():
-    """{module: modules that it includes}; a module is a .c with its .h, named by its path."""
-    graph = {}
-    for path in sorted(firmware_build.HERE.rglob("*.[ch]")):
-        module = path.relative_to(firmware_build.HERE).with_suffix("").as_posix()
-        names = re.findall(r'^#include "(.+)\.h"', path.read_text(encoding="utf-8"), re.MULTILINE)
-        graph.setdefault(module, set()).update(set(names) - {module})
-    return graph
-
-
-def test_a_module_includes_only_its_own_and_lower_layers():
-    graph = includes()
-    assert len(graph) > 30
-    for module, others in graph.items():
-        layer = module.partition("/")[0]
-        for other in others:
-            below = other.partition("/")[0]
-            assert LAYERS.index(below) <= LAYERS.index(layer), f"{module} includes {other}"
-            assert below == layer or {below, layer} != BESIDE, f"{module} includes {other}"
-
-
-def test_directories_of_the_station_do_not_include_each_other_in_a_circle():
-    left = {}
-    for module, others in includes().items():
-        directory = module.rpartition("/")[0]
-        above = {other.rpartition("/")[0] for other in others} - {directory}
-        if directory.startswith("station/"):
-            left.setdefault(directory, set()).update(above)
-    assert len(left) == 5
-    while free := [directory for directory, others in left.items() if not others & left.keys()]:
-        for directory in free:
-            del left[directory]
-    assert not left, f"these include each other in a circle: {sorted(left)}"

@@ -44,7 +44,7 @@ def test_a_job_cuts_every_station_once_and_in_order(frames):
     job = start(station, "finished", "paused", "unsure")
     assert job["state"] == "finished" and job["cause"] == "ok" and cuts(station) == STATIONS
     assert station.sub_node.angles == (ANGLES if frames else [None] * STATIONS)
-    assert station.edm.heard == station.edm.START * STATIONS
+    assert station.edm.received == station.edm.START * STATIONS
     assert station.do("start") == "ok"  # and again, from the first station on
     station.until("finished")
     assert cuts(station) == 2 * STATIONS
@@ -162,10 +162,12 @@ def test_the_keys_wait_while_a_person_types():
     start(station, "cutting")
     station.run(15_000)
     assert (
-        cuts(station) == 0 and "keys_pending" in station.job()["flags"] and station.edm.heard == b""
+        cuts(station) == 0
+        and "keys_pending" in station.job()["flags"]
+        and station.edm.received == b""
     )
     station.until("finished")
-    assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
+    assert cuts(station) == STATIONS and station.edm.received == station.edm.START * STATIONS
 
 
 # the machine
@@ -177,7 +179,7 @@ def test_after_a_cut_that_does_not_start_a_person_is_asked_and_no_key_is_sent_ag
     job = start(station, "unsure")
     assert job["cause"] == "cut_not_started" and job["answers"] == {"again", "next", "stop"}
     station.run(10_000)
-    assert station.edm.heard == station.edm.START
+    assert station.edm.received == station.edm.START
     station.edm.deaf = False
     assert station.do("again") == "ok"
     station.until("finished")
@@ -256,7 +258,7 @@ def test_an_alarm_before_the_cut_pauses():
     assert (
         job["cause"] == "edm_alarm"
         and station.do("resume") == "edm_alarm"
-        and station.edm.heard == b""
+        and station.edm.received == b""
     )
     station.edm.alarm(False)
     station.do("resume")
@@ -282,10 +284,10 @@ def test_keys_that_the_machine_does_not_take_are_dropped_and_never_come_late():
     )
     station.edm.takes_nothing = False
     station.run(5000)
-    assert cuts(station) == 0 and station.edm.heard == b""
+    assert cuts(station) == 0 and station.edm.received == b""
     station.do("again")
     station.until("finished")
-    assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
+    assert cuts(station) == STATIONS and station.edm.received == station.edm.START * STATIONS
 
 
 def test_a_machine_that_takes_half_the_keys_is_reported_and_gets_the_others_once():
@@ -302,7 +304,7 @@ def test_a_machine_that_takes_half_the_keys_is_reported_and_gets_the_others_once
     assert station.run(30_000, until=lambda: station.edm.inputs & 1)
     assert station.do("resume") == "ok"
     station.until("finished")
-    assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
+    assert cuts(station) == STATIONS and station.edm.received == station.edm.START * STATIONS
 
 
 def test_stop_drops_the_keys_that_wait():
@@ -314,7 +316,7 @@ def test_stop_drops_the_keys_that_wait():
     station.until("idle")
     station.edm.takes_nothing = False
     station.run(5000)
-    assert cuts(station) == 0 and station.edm.heard == b"" and station.do("start") == "ok"
+    assert cuts(station) == 0 and station.edm.received == b"" and station.do("start") == "ok"
 
 
 def test_a_machine_that_cuts_or_alarms_is_not_started():
@@ -579,7 +581,7 @@ def test_no_cut_begins_that_is_not_in_the_journal():
     job = station.until("paused")
     assert (
         job["cause"] == "eeprom_missing"
-        and station.edm.heard == b""
+        and station.edm.received == b""
         and station.do("resume") == "eeprom_missing"
     )
     station.bus.devices[0x50] = station.eeprom

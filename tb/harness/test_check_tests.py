@@ -78,7 +78,7 @@ def test_a_test_that_runs_a_simulation_compares_there(tmp_path):
     ]
 
 
-def test_our_own_tests_can_fail(capsys):
+def test_the_tests_of_this_project_can_fail(capsys):
     assert check_tests.main([]) == 0, capsys.readouterr().out
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checks of tools/: each finds what is planted, and nothing in the project."""
+"""The checks of tools/: each finds a planted problem, and none in the project."""
 
 import ast
 
@@ -12,7 +12,7 @@ MODULE = """// SPDX-License-Identifier: Apache-2.0
 // thing -- adds.
 //
 // latency  2 cycles from valid to done, and 3 cycles to the sum
-// model    tb/room/thing.py
+// model    tb/block/thing.py
 `default_nettype none
 
 module thing #(
@@ -35,35 +35,35 @@ def module(tmp_path, monkeypatch):
     """A module with bare ports and latencies to be tested, in a project of its own."""
     for part in (modules, check_latency, check_ports):
         monkeypatch.setattr(part, "ROOT", tmp_path)
-    path = tmp_path / "rtl" / "room" / "thing.sv"
-    (tmp_path / "tb" / "room").mkdir(parents=True)
+    path = tmp_path / "rtl" / "block" / "thing.sv"
+    (tmp_path / "tb" / "block").mkdir(parents=True)
     path.parent.mkdir(parents=True)
     path.write_text(MODULE)
     return path
 
 
 def test_a_port_and_a_parameter_without_a_comment_are_found(module):
-    assert check_ports.problems() == ["rtl/room/thing.sv:10: N", "rtl/room/thing.sv:14: level"]
+    assert check_ports.problems() == ["rtl/block/thing.sv:10: N", "rtl/block/thing.sv:14: level"]
 
 
 @pytest.mark.parametrize(
     "names, missing",
     [
-        ([], ["rtl/room/thing.sv: no test latency_is_…"]),
-        (["latency_is_2_to_done"], ["rtl/room/thing.sv: no test latency_is_3"]),
+        ([], ["rtl/block/thing.sv: no test latency_is_…"]),
+        (["latency_is_2_to_done"], ["rtl/block/thing.sv: no test latency_is_3"]),
         (["latency_is_2_to_done", "latency_is_3_to_the_sum"], []),
         (["latency_is_2_to_done_and_3_to_the_sum"], []),
         (["latency_is_23"], ["no test latency_is_2", "no test latency_is_3"]),
     ],
 )
 def test_a_latency_without_a_test_of_its_name_is_found(module, names, missing):
-    test = module.parents[2] / "tb" / "room" / "test_thing.py"
+    test = module.parents[2] / "tb" / "block" / "test_thing.py"
     test.write_text("".join(f"async def {name}(dut):\n    pass\n" for name in names))
     found = check_latency.problems()
     assert len(found) == len(missing) and all(m in f for m, f in zip(missing, found, strict=True))
 
 
-def test_a_cycle_and_its_way_are_found():
+def test_a_cycle_is_found_with_its_modules():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}
     (found,) = check_imports.cycles(graph)
     assert found.startswith("cycle: ") and {"a", "b", "c"} <= set(found.split())
@@ -78,7 +78,23 @@ def test_an_import_in_the_wrong_direction_is_found():
     ]
 
 
-def test_relative_deferred_and_typed_imports_are_told_apart():
+def test_an_include_of_a_higher_layer_and_a_cycle_of_directories_are_found():
+    station = "sw/firmware/station/"
+    graph = {
+        "sw/firmware/axis/homing": {"sw/firmware/axis/motion", "sw/firmware/core/clock"},
+        "sw/firmware/core/clock": {"sw/firmware/axis/motion"},
+        "sw/firmware/calibration/run": {station + "job/job"},
+        station + "job/job": {station + "panel/panel"},
+        station + "panel/panel": {station + "job/states", station + "panel/keys"},
+    }
+    assert check_imports.wrong_layers(graph) == [
+        "sw/firmware/calibration/run must not include station/job/job",
+        "sw/firmware/core/clock must not include axis/motion",
+        "cycle: station/job <- station/panel <- station/job",
+    ]
+
+
+def test_relative_deferred_and_typed_imports_are_distinguished():
     tree = ast.parse(
         "from . import x\nimport a.b\nif TYPE_CHECKING:\n    import hidden\n"
         "def f():\n    from late import y\n"

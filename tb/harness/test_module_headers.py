@@ -111,7 +111,7 @@ STAND_ALONE = {  # instantiated by no other module, and the reason why they exis
 }
 
 
-def test_every_module_is_part_of_another_or_stands_alone_for_a_reason():
+def test_every_module_is_part_of_another_or_has_a_reason_to_be_alone():
     texts = {
         path.stem: re.sub(r"//.*", "", path.read_text())
         for path in (modules.ROOT / "rtl").rglob("*.sv")

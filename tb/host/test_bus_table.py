@@ -106,17 +106,17 @@ def test_offsets_and_lengths_in_the_header_match_a_packed_struct():
         "i64": "q",
     }
     for name, source in TABLE["operation"].items():
-        for way, head in (("request", "BB"), ("reply", "BBB")):
+        for direction, head in (("request", "BB"), ("reply", "BBB")):
             laid = "<" + head
-            for declared in source[way]:
+            for declared in source[direction]:
                 field, kind = declared.split()
                 assert (
-                    f"#define BUS_{name}_{way}_{field} {struct.calcsize(laid)}u ".upper()
+                    f"#define BUS_{name}_{direction}_{field} {struct.calcsize(laid)}u ".upper()
                     in HEADER.upper()
                 )
                 laid += formats[kind]
             assert re.search(
-                f"#define BUS_{name}_{way}_LENGTH {struct.calcsize(laid)}u$".upper(),
+                f"#define BUS_{name}_{direction}_LENGTH {struct.calcsize(laid)}u$".upper(),
                 HEADER.upper(),
                 re.MULTILINE,
             )
@@ -169,7 +169,7 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change, said",
+    "change, message",
     [
         (("code = 2\n", "code = 1\n"), "operation codes repeat"),
         (("id = 2, ", "id = 1, "), "parameter ids repeat"),
@@ -179,14 +179,16 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         (('[1,  "the node', '[2,  "the node'), "cause codes repeat"),
     ],
 )
-def test_a_wrong_table_is_refused_by_name_in_one_line(change, said, tmp_path, monkeypatch, capsys):
+def test_a_wrong_table_is_refused_by_name_in_one_line(
+    change, message, tmp_path, monkeypatch, capsys
+):
     text = SOURCE.read_text(encoding="utf-8")
     assert change[0] in text
     monkeypatch.setattr(generator, "SOURCE", tmp_path / "bus.toml")
     generator.SOURCE.write_text(text.replace(*change, 1), encoding="utf-8")
     assert generator.main([]) == 1
     reported = capsys.readouterr()
-    assert said in reported.err and reported.err.count("\n") == 1 and not reported.out
+    assert message in reported.err and reported.err.count("\n") == 1 and not reported.out
 
 
 def test_a_page_without_its_markers_is_refused():

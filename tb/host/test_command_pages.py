@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tables/commands.py and the pages that people copy from: nothing made is stale, and every command
-written there is understood.
+"""tables/commands.py and the pages with commands: no made page is stale, and every command on a
+page is valid.
 """
 
 import re
@@ -43,11 +43,11 @@ def test_a_stale_page_and_one_of_no_command_are_found_and_put_right(tmp_path, mo
     (tmp_path / "commands" / "fly.md").write_text("gone")
     capsys.readouterr()
     assert generator.main(["--check"]) == 1
-    said = capsys.readouterr().err
+    message = capsys.readouterr().err
     assert (
-        "commands/move.md is stale" in said
-        and "commands/fly.md is stale" in said
-        and said.count("\n") == 2
+        "commands/move.md is stale" in message
+        and "commands/fly.md is stale" in message
+        and message.count("\n") == 2
     )
     assert (
         generator.main([]) == 0

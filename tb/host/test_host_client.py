@@ -373,7 +373,7 @@ def test_a_motion_that_a_fault_ends_names_the_first_fault():
 
 
 @pytest.mark.parametrize("cause", ["no_switch", "switch_stuck", "not_settled"])
-def test_a_motion_that_fails_says_why(cause):
+def test_a_motion_that_fails_reports_the_cause(cause):
     fake, node, axis = homed_stage()
     node.axes[0].end_cause = cause
     with pytest.raises(MotionFailed, match=dict(CAUSES.values())[cause]):
@@ -513,12 +513,14 @@ def test_a_node_that_misses_the_sync_is_named_and_the_others_are_stopped():
     fake, bus = two_nodes()
     for axis in (bus.axis(1), bus.axis(2)):
         axis.prepare(mm=1)
-    deaf, hears = fake.nodes[1], fake.nodes[1].receive_word
-    deaf.receive_word = lambda word: [] if deaf.waiting_for_sync and word == 0x120 else hears(word)
+    unreachable, receive_word = fake.nodes[1], fake.nodes[1].receive_word
+    unreachable.receive_word = lambda word: (
+        [] if unreachable.waiting_for_sync and word == 0x120 else receive_word(word)
+    )
     with pytest.raises(BusError, match="node 2 did not receive the sync"):
         bus.start(bus.axis(1), bus.axis(2))
     fake.wait(1)
-    assert bus.axis(1).status().ended == "stopped" and not deaf.waiting_for_sync
+    assert bus.axis(1).status().ended == "stopped" and not unreachable.waiting_for_sync
 
 
 def test_a_new_baud_rate_is_set_in_all_nodes_or_in_none():
@@ -620,7 +622,7 @@ def test_an_interrupted_common_start_stops_all_of_them():
     assert [axis.ended for axis in fake.nodes[0].axes] == ["stopped", "stopped"]
 
 
-def test_a_prepared_move_beyond_the_travel_says_where_it_ends():
+def test_a_prepared_move_beyond_the_travel_reports_its_end():
     _, _, axis = homed_stage()
     with pytest.raises(Refused, match="target 200mm, allowed -800um to 119.6mm"):
         axis.prepare("200mm")
@@ -801,7 +803,7 @@ def test_both_ends_of_each_range_are_accepted_and_values_beyond_are_not_sent(nam
         assert len(node.axes[0].writes) == written
 
 
-def test_wrong_values_say_what_is_allowed():
+def test_wrong_values_are_refused_with_what_is_allowed():
     fake, node, axis = stage()
     with pytest.raises(OutOfRange, match="velocity allows 800nm/s to 800mm/s, not 900mm/s"):
         axis.set_parameter("velocity", "900mm/s")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""moire.bus.cobs: stuffing as in the published examples, packets, and a reader that any noise
-leaves in order.
+"""moire.bus.cobs: stuffing as in the published examples, packets, and a reader
+that recovers from any noise.
 """
 
 import random
@@ -45,8 +45,8 @@ def test_stuffed_bytes_have_no_zero_and_can_be_unstuffed():
 def test_the_packet_of_the_protocol_page():
     page = (Path(__file__).resolve().parents[2] / "docs" / "protocol.md").read_text()
     assert cobs.packet(0x21, BODY).hex(" ") == "00 05 21 04 07 03 06 01 86 67 24 60 00"
-    for first, body, who in ((0x21, BODY, "client  "), (0x51, bytes([7, 3, 0]), "node    ")):
-        assert who + cobs.packet(first, body).hex(" ").upper() in page
+    for first, body, sender in ((0x21, BODY, "client  "), (0x51, bytes([7, 3, 0]), "node    ")):
+        assert sender + cobs.packet(first, body).hex(" ").upper() in page
     assert cobs.PacketReader().feed(cobs.packet(0x21, BODY)) == [bytes([0x21]) + frame(0x21, BODY)]
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""command_line: sequences, exit codes, JSON, files, the shell, and that every error is one sentence
-that says what is allowed.
+"""command_line: sequences, exit codes, JSON, files, the shell. Every error is one sentence that
+states what is allowed.
 """
 
 import importlib.metadata
@@ -41,12 +41,12 @@ class Call:
         self.out, self.err = out.getvalue(), err.getvalue()
 
     @property
-    def told(self):
+    def results(self):
         return [json.loads(row) for row in self.out.splitlines()]
 
 
 def sentence(call, code):
-    """The one line that was complained."""
+    """The one line of the error message."""
     assert call.code == code and call.err.count("\n") == 1 and call.err.startswith("moire: "), (
         call.err
     )
@@ -85,7 +85,7 @@ def test_options_of_the_first_command_hold_for_all_and_may_be_given_again():
         "-- status --address 1 --axis 0 --json",
         *nodes,
     )
-    assert [(told["address"], told["axis"]) for told in call.told] == [
+    assert [(result["address"], result["axis"]) for result in call.results] == [
         (2, 1),
         (2, 1),
         (2, 0),
@@ -103,11 +103,11 @@ def test_find_lists_the_nodes_and_marks_those_of_another_build():
     assert "node 3: 2 axes" in call.out and "MADE FROM OTHER SOURCES" in call.out
     assert [
         node["matches"]
-        for node in Call("find --json", FakeNode(1), FakeNode(3, map_crc=1)).told[0]["nodes"]
+        for node in Call("find --json", FakeNode(1), FakeNode(3, map_crc=1)).results[0]["nodes"]
     ] == [True, False]
 
 
-def test_find_tries_the_usual_baud_rates_and_says_which_it_is():
+def test_find_tries_the_usual_baud_rates_and_reports_the_one_found():
     node = FakeNode(2)
     node.baud = 1_000_000
     assert "or try all with 'find --any-baud'" in sentence(Call("find", node), 3)
@@ -115,7 +115,7 @@ def test_find_tries_the_usual_baud_rates_and_says_which_it_is():
     assert (
         call.code == 0 and "at 1000000 baud: --baud 1000000" in call.out and "drive off" in call.out
     )
-    assert Call("find --any-baud --json", node).told[0]["baud"] == 1_000_000
+    assert Call("find --any-baud --json", node).results[0]["baud"] == 1_000_000
     assert "check power and wiring; no usual baud rate is left" in sentence(
         Call("find 5 --any-baud", node), 3
     )
@@ -128,14 +128,17 @@ def test_enable_wait_stop_reset_encoder_counters():
     assert "margin 50 %" in call.out and "frames_good" in call.out and "no_answer" in call.out
 
 
-def test_a_node_without_sine_and_cosine_says_so():
+def test_a_node_without_sine_and_cosine_reports_it():
     node = FakeNode(sine=False)
     call = Call("status -- encoder", node)
     assert (
         call.out.count("counts only: built without sine and cosine") == 2
         and "ADC counts" not in call.out
     )
-    assert [told["sine"] for told in Call("status -- encoder --json", node).told] == [False, False]
+    assert [result["sine"] for result in Call("status -- encoder --json", node).results] == [
+        False,
+        False,
+    ]
     assert "built without this function" in sentence(Call("signal", node), 1)
     call = Call("status -- encoder")
     assert "without" not in call.out and "ADC counts" in call.out
@@ -151,7 +154,7 @@ def test_registers_by_address_and_by_name():
         "bus.frames_good: value = 258\naxis.control: enable = 1" in call.out
     )
     assert "axis.position" in Call("register").out
-    assert Call("register 0x110 --json", node).told[0]["registers"] == {"0x110": 258}
+    assert Call("register 0x110 --json", node).results[0]["registers"] == {"0x110": 258}
 
 
 def test_parameters_are_listed_set_and_read_back():
@@ -165,7 +168,7 @@ def test_parameters_are_listed_set_and_read_back():
         Call("params set travel_low -1.5mm", node).code == 0
         and node.axes[0].parameters[3] == -1875 * 65536
     )
-    assert Call("params get period --json", node).told[0]["parameters"][0]["value"] == 800
+    assert Call("params get period --json", node).results[0]["parameters"][0]["value"] == 800
 
 
 def test_parameters_are_saved_and_loaded(tmp_path):
@@ -245,7 +248,7 @@ def test_the_drive_and_choices_in_words():
     )
 
 
-def test_tune_reads_a_record_tells_gains_and_writes_them(tmp_path):
+def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
     node, record, picture = FakeNode(), tmp_path / "record.csv", tmp_path / "tuning.png"
     position = velocity = 0.0
     rows = ["command,position"]
@@ -258,20 +261,20 @@ def test_tune_reads_a_record_tells_gains_and_writes_them(tmp_path):
         ["tune", str(record), "--bandwidth", "40Hz", "--picture", str(picture), "--json"], node
     )
     assert call.code == 0, call.err
-    told = call.told[0]
+    result = call.results[0]
     assert (
-        told["plant"]["a"] == pytest.approx(0.95, rel=0.01)
-        and not told["written"]
+        result["plant"]["a"] == pytest.approx(0.95, rel=0.01)
+        and not result["written"]
         and picture.read_bytes().startswith(b"\x89PNG")
     )
     assert node.axes[0].writes == []
     call = Call(["tune", str(record), "--bandwidth", "40Hz", "--tick", "250us", "--write"], node)
     assert call.code == 0 and "written to node 1 axis 0" in call.out
-    assert node.axes[0].parameters[PARAMETERS["kp"].id] == round(told["gains"]["kp"] * 65536) > 0
+    assert node.axes[0].parameters[PARAMETERS["kp"].id] == round(result["gains"]["kp"] * 65536) > 0
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, message",
     [
         ("1,2,3\n1,2,3", "is no record"),
         ("1,x\n2,3", "is no record"),
@@ -279,11 +282,11 @@ def test_tune_reads_a_record_tells_gains_and_writes_them(tmp_path):
         ("command,position\n1,2", "too few"),
     ],
 )
-def test_a_file_that_is_no_record_is_refused(tmp_path, text, said):
+def test_a_file_that_is_no_record_is_refused(tmp_path, text, message):
     record = tmp_path / "record.csv"
     record.write_text(text)
     call = Call(["tune", str(record), "--bandwidth", "40Hz"])
-    assert call.code in (1, 2) and said in call.err and call.err.count("\n") == 1
+    assert call.code in (1, 2) and message in call.err and call.err.count("\n") == 1
 
 
 # ------------------------------------------------------------------ JSON
@@ -318,13 +321,13 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, text, said):
         "selftest",
     ],
 )
-def test_every_command_tells_one_json_object_a_line(text):
+def test_every_command_prints_one_json_object_per_line(text):
     node = FakeNode()
     node.axes[0].enabled = True
     for arguments in (text + " --json", "--json " + text):
         call = Call(arguments, node)
         assert call.code == 0 and call.err == ""
-        assert [told["command"] for told in call.told] == [
+        assert [result["command"] for result in call.results] == [
             part.split()[0] for part in text.split(" -- ")
         ]
         node.axes[0].enabled = True
@@ -333,17 +336,17 @@ def test_every_command_tells_one_json_object_a_line(text):
 def test_status_in_json_has_numbers_and_words():
     node = FakeNode()
     node.axes[0].active_faults = node.axes[0].faults = ESTOP
-    told = Call("status --json", node).told[0]
+    result = Call("status --json", node).results[0]
     assert (
-        told["faults"] == ["estop"]
-        and told["fault_words"] == "emergency stop"
-        and told["state"] == "faulted"
+        result["faults"] == ["estop"]
+        and result["fault_words"] == "emergency stop"
+        and result["state"] == "faulted"
     )
-    assert told["position_nm"] == pytest.approx(123456 / 65536 * 800) and told["homed"] is False
+    assert result["position_nm"] == pytest.approx(123456 / 65536 * 800) and result["homed"] is False
 
 
 def test_errors_are_json_too():
-    assert Call("move 1mm --json").told == [
+    assert Call("move 1mm --json").results == [
         {
             "command": "move",
             "error": "Refused",
@@ -352,11 +355,11 @@ def test_errors_are_json_too():
             "cause": "not_homed",
         }
     ]
-    told = Call("move 1 --json").told[0]
+    result = Call("move 1 --json").results[0]
     assert (
-        told["error"] == "UsageError"
-        and told["exit_code"] == 2
-        and "such as 1.5mm" in told["message"]
+        result["error"] == "UsageError"
+        and result["exit_code"] == 2
+        and "such as 1.5mm" in result["message"]
     )
 
 
@@ -374,22 +377,26 @@ def test_errors_are_json_too():
     ],
 )
 def test_a_usage_error_names_its_command(text, command):
-    (told,) = Call(["--json", *text.split()] if text else ["--json", "--"]).told
-    assert told["command"] == command and told["error"] == "UsageError" and told["exit_code"] == 2
+    (result,) = Call(["--json", *text.split()] if text else ["--json", "--"]).results
+    assert (
+        result["command"] == command
+        and result["error"] == "UsageError"
+        and result["exit_code"] == 2
+    )
 
 
 def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
     node = FakeNode()
     node.registers.update({0x1400: 1 | 0b0111 << 2, 0x1420: 25, 0x143C: 0})
-    told = Call("drive --json", node).told[0]
-    assert told["command"] == "drive" and told["drive_command"] == 0 and told["steps"] == 25
+    result = Call("drive --json", node).results[0]
+    assert result["command"] == "drive" and result["drive_command"] == 0 and result["steps"] == 25
 
 
 # ------------------------------------------------------------------ errors and exit codes
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, message",
     [
         ("", "a command is missing"),
         ("status --", "a command is missing beside --"),
@@ -433,10 +440,10 @@ def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
         ("status -- shell", "'shell' must be the only command of its call"),
     ],
 )
-def test_wrong_usage_is_one_sentence_and_exit_code_2(text, said):
+def test_wrong_usage_is_one_sentence_and_exit_code_2(text, message):
     node = FakeNode()
     node.registers = {}
-    assert said in sentence(Call(text, node), 2)
+    assert message in sentence(Call(text, node), 2)
     assert "set_parameter" not in node.executed
 
 
@@ -462,8 +469,8 @@ def test_a_motion_that_ends_badly_is_exit_code_1():
     node = FakeNode()
     node.axes[0].end_cause = "no_switch"
     assert "no limit switch was found within the travel" in sentence(Call("home", node), 1)
-    told = Call("home --json", node).told[-1]
-    assert (told["error"], told["cause"]) == ("MotionFailed", "no_switch") and CAUSE[
+    result = Call("home --json", node).results[-1]
+    assert (result["error"], result["cause"]) == ("MotionFailed", "no_switch") and CAUSE[
         "no_switch"
     ] == 15
 
@@ -497,7 +504,7 @@ def test_ports_are_exit_code_4(monkeypatch):
     )
 
 
-def test_without_a_checkout_the_port_twin_says_what_to_do(monkeypatch):
+def test_without_a_checkout_the_port_twin_reports_what_to_do(monkeypatch):
     monkeypatch.setattr("moire.bus.twin_port.entry_points", lambda **_: ())
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
@@ -562,7 +569,7 @@ def test_ctrl_c_in_another_command_stops_what_moves_too():
         raise KeyboardInterrupt
 
     bus.at.append((0.5, interrupt))
-    assert Call("move 100mm --no-wait -- watch --json", bus=bus).told[-1]["exit_code"] == 130
+    assert Call("move 100mm --no-wait -- watch --json", bus=bus).results[-1]["exit_code"] == 130
     assert (
         node.executed[-1] == "enable"
         and "stop" in node.executed
@@ -617,14 +624,14 @@ def test_baud_and_parity_reach_the_port():
 
 
 def test_help_names_every_command_and_gives_examples(capsys):
-    for arguments, said in (
+    for arguments, message in (
         (["--help"], "moire --port twin home -- move 1mm -- status"),
         (["move", "--help"], "example: moire"),
         (["params", "set", "--help"], "velocity 5mm/s"),
     ):
         with pytest.raises(SystemExit) as left:
             command_line.main(arguments)
-        assert left.value.code == 0 and said in capsys.readouterr().out
+        assert left.value.code == 0 and message in capsys.readouterr().out
 
 
 def test_the_version_is_the_one_of_the_package(capsys):
@@ -674,17 +681,17 @@ def test_a_file_of_commands_is_carried_out(tmp_path):
     node, file = FakeNode(), tmp_path / "warm up.txt"
     file.write_text("# to the zero\nhome\n\nmove 1mm   # there\nmove -0.5mm --by -- status\n")
     call = Call(["run", str(file), "--json"], node)
-    assert call.code == 0 and [told["command"] for told in call.told] == [
+    assert call.code == 0 and [result["command"] for result in call.results] == [
         "home",
         "move",
         "move",
         "status",
     ]
-    assert call.told[-1]["position_nm"] == 500_000 and not node.axes[0].enabled
+    assert call.results[-1]["position_nm"] == 500_000 and not node.axes[0].enabled
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, message",
     [
         ("home\nmove 1\n", "line 2 of"),
         ("shell\n", "'shell' is not allowed in a file or a shell"),
@@ -692,10 +699,10 @@ def test_a_file_of_commands_is_carried_out(tmp_path):
         ("move '1mm\n", "cannot be read: No closing quotation"),
     ],
 )
-def test_a_file_with_a_wrong_line_moves_nothing(tmp_path, text, said):
+def test_a_file_with_a_wrong_line_moves_nothing(tmp_path, text, message):
     node, file = FakeNode(), tmp_path / "wrong.txt"
     file.write_text(text)
-    assert said in sentence(Call(["run", str(file)], node), 2)
+    assert message in sentence(Call(["run", str(file)], node), 2)
     assert node.executed == []
 
 
@@ -719,7 +726,7 @@ def test_the_shell_keeps_the_drive_on_between_commands(monkeypatch):
     )  # on once, off once at the end
 
 
-def test_json_may_be_asked_for_a_single_line(monkeypatch):
+def test_json_may_be_selected_for_a_single_line(monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.StringIO("enable\nstatus --json\ndisable\n"))
     rows = Call("shell").out.splitlines()
     assert (
@@ -754,8 +761,8 @@ def test_ctrl_c_in_the_shell_stops_what_moves(monkeypatch):
 def test_the_shell_has_help(monkeypatch, capsys):
     monkeypatch.setattr(sys, "stdin", io.StringIO("help move\nhelp\n"))
     assert Call("shell").code == 0
-    said = capsys.readouterr().out
-    assert "Usage: moire move" in said and "Usage: moire [OPTIONS] COMMAND" in said
+    message = capsys.readouterr().out
+    assert "Usage: moire move" in message and "Usage: moire [OPTIONS] COMMAND" in message
 
 
 SHELL_AT_A_TERMINAL = """
@@ -812,7 +819,7 @@ def test_a_terminal_has_line_editing_completion_and_history(tmp_path):
     ]
 
 
-def test_a_shell_whose_node_falls_silent_ends(monkeypatch):
+def test_a_shell_ends_when_its_node_no_longer_answers(monkeypatch):
     class Keyboard:
         def isatty(self):
             return True
@@ -843,9 +850,9 @@ def test_a_person_may_mistype_in_the_shell(monkeypatch):
     assert "'fly'" in call.err and "'1' has no unit" in call.err and "moire> " in call.err
 
 
-def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
+def test_a_waiting_shell_sends_requests_on_a_bus_in_real_time(monkeypatch):
     class Keyboard:
-        """Waits until the shell has talked for itself."""
+        """A keyboard that waits until the shell has sent a request by itself."""
 
         def isatty(self):
             return False

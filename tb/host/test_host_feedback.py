@@ -67,15 +67,15 @@ def test_calibration_moves_at_several_speeds_and_ends_frozen_where_it_began():
     assert inside.parameters[VELOCITY] == PARAMETERS["velocity"].default
 
 
-def test_calibrate_homes_learns_and_saves(tmp_path):
+def test_calibrate_homes_calibrates_and_saves(tmp_path):
     node, file = FakeNode(), tmp_path / "stage.json"
     node.axes[0].correction["gain"] = 65000
     call = Call(["commission", str(file), "--json"], node)
     assert call.code == 0, call.err
     assert (
-        call.told[0]["command"] == "commission"
-        and call.told[0]["settled"]
-        and call.told[0]["frozen"]
+        call.results[0]["command"] == "commission"
+        and call.results[0]["settled"]
+        and call.results[0]["frozen"]
     )
     assert node.axes[0].homed and json.loads(file.read_text())["correction"]["gain"] == 65000
     before = node.executed.count("home")
@@ -275,7 +275,7 @@ def test_calibrate_save_clear_load_on_the_command_line(tmp_path):
 def test_a_calibration_that_fails_is_exit_code_1_with_its_cause():
     node = FakeNode()
     node.axes[0].moves_to_calibrate = None
-    reported = Call("home -- calibrate --timeout 2s --json", node).told[-1]
+    reported = Call("home -- calibrate --timeout 2s --json", node).results[-1]
     assert (reported["error"], reported["cause"], reported["exit_code"]) == (
         "NotCalibrated",
         "calibrating",
@@ -342,13 +342,13 @@ def test_each_command_prints_one_json_object_in_a_line(text):
     node.captures = [[1, 2, 3, 0]]
     call = Call(text + " --json", node)
     assert call.code == 0 and call.err == ""
-    assert [reported["command"] for reported in call.told] == [
+    assert [reported["command"] for reported in call.results] == [
         part.split()[0] for part in text.split(" -- ")
     ]
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, message",
     [
         ("calibrate --distance 1", "has no unit"),
         ("calibrate --distance 0mm", "not above zero"),
@@ -362,9 +362,9 @@ def test_each_command_prints_one_json_object_in_a_line(text):
         ("compare from 1mm 1um --pulse 9s", "pulse and gap allow"),
     ],
 )
-def test_wrong_usage_is_one_sentence(text, said):
+def test_wrong_usage_is_one_sentence(text, message):
     node = FakeNode()
-    assert said in sentence(Call(text, node), 2)
+    assert message in sentence(Call(text, node), 2)
     assert node.written == []
 
 

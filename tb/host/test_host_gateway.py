@@ -30,7 +30,7 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
 )  # in pyserial
 SEED = seed()
-HANG_S = 60  # what has not arrived by then never will
+HANG_S = 60  # a word that has not arrived by then never will
 
 
 class Served:
@@ -299,19 +299,19 @@ def test_a_port_unplugged_during_a_move_is_one_sentence_that_names_the_watchdog(
     threading.Thread(
         target=lambda: (served.wait_until(lambda: "move" in node.executed), served.end())
     ).start()
-    said = complaint(f"--port {served.ports[entrance]} move 100mm", 4)
+    message = complaint(f"--port {served.ports[entrance]} move 100mm", 4)
     assert (
-        served.ports[entrance] in said
-        and "axis 0 of node 1 could not be stopped by the host, its watchdog has to" in said
+        served.ports[entrance] in message
+        and "axis 0 of node 1 could not be stopped by the host, its watchdog has to" in message
     )
 
 
 @pytest.mark.parametrize("served", [(FakeNode(1, map_crc=1),)], indirect=True)
 def test_a_node_of_another_build_is_one_sentence(served):
-    said = complaint(f"--port {served.ports['tcp']} status", 5)
+    message = complaint(f"--port {served.ports['tcp']} status", 5)
     assert (
-        "node 1 was made from another register map" in said
-        and "build both from the same sources" in said
+        "node 1 was made from another register map" in message
+        and "build both from the same sources" in message
     )
 
 

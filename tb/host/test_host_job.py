@@ -164,9 +164,9 @@ def test_a_question_is_printed_and_answered():
 def test_waiting_polls_the_table_too():
     workshop, operations = Workshop(), []
     workshop.call("job load --equal 2")
-    hear = workshop.station.hear
-    workshop.station.hear = lambda words: (
-        operations.append(words[2] if len(words) > 2 else None) or hear(words)
+    receive = workshop.station.receive
+    workshop.station.receive = lambda words: (
+        operations.append(words[2] if len(words) > 2 else None) or receive(words)
     )
     assert workshop.call("job start --wait")[0] == 0 and OPERATION["status"] not in operations
     assert (

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The wheel of sw/host alone, installed outside the checkout: `moire` works there, and says in one
-line that the twin needs a checkout.
+"""The wheel of sw/host alone, installed outside the checkout: `moire` works there, and reports in
+one line that the twin needs a checkout.
 """
 
 import os

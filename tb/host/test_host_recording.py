@@ -37,11 +37,11 @@ def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
 def test_other_values_are_distinguished_from_other_outcomes(tmp_path):
     file, other, broken = recorded(tmp_path, "status"), FakeNode(), FakeNode()
     other.axes[0].position += 1
-    reported = Call(f"replay {file} --json", other).told[0]
+    reported = Call(f"replay {file} --json", other).results[0]
     assert (reported["same"], reported["other_values"], reported["different"]) == (7, 1, 0)
     broken.wrong_map = True
-    said = sentence(Call(f"replay {file}", broken), 1)
-    assert "answers differ from the record: at 0." in said and "came instead of" in said
+    message = sentence(Call(f"replay {file}", broken), 1)
+    assert "answers differ from the record: at 0." in message and "came instead of" in message
 
 
 def test_a_replay_to_a_silent_node_differs(tmp_path):
@@ -99,8 +99,8 @@ def test_a_recorder_hides_nothing_of_its_transport():
 
 def test_a_change_of_the_baud_rate_and_the_break_after_it_are_recorded_and_replayed(tmp_path):
     file = recorded(tmp_path, "baud 1000000 1 -- home -- status")
-    said = [set(call) - {"at"} for call in recording.read(file.read_text())]
-    assert [call for call in said if call & {"baud", "break"}] == [{"baud"}, {"break"}, {"baud"}]
+    events = [set(call) - {"at"} for call in recording.read(file.read_text())]
+    assert [call for call in events if call & {"baud", "break"}] == [{"baud"}, {"break"}, {"baud"}]
     node = FakeNode()
     assert Call(f"replay {file}", node).code == 0
     assert node.counters["breaks"] == 1 and node.baud == 115200 and node.axes[0].homed
@@ -173,16 +173,16 @@ def test_a_record_that_cannot_be_written_is_one_sentence(tmp_path):
 # ------------------------------------------------------------------ watch, fault and self-test
 
 
-def test_watch_prints_the_state_as_often_as_asked_and_ends_in_time():
+def test_watch_prints_the_state_at_the_given_interval_and_ends_in_time():
     call = Call("watch --every 0.1s --for 0.5s --json")
-    assert [round(reported["time_s"], 1) for reported in call.told] == [
+    assert [round(reported["time_s"], 1) for reported in call.results] == [
         0.0,
         0.1,
         0.2,
         0.3,
         0.4,
         0.5,
-    ] and call.told[0]["state"] == "off"
+    ] and call.results[0]["state"] == "off"
     assert "drive off" in Call("watch --for 0s").out
 
 
@@ -203,7 +203,7 @@ def test_fault_reports_cause_position_and_what_to_do():
         and "signal too small" in out
     )
     assert "remove the cause, then 'moire reset', then 'moire home'" in out
-    assert Call("fault --json", node).told[0]["first_fault"] == ["estop"]
+    assert Call("fault --json", node).results[0]["first_fault"] == ["estop"]
 
 
 def test_selftest_passes_a_sound_node():
@@ -254,7 +254,7 @@ def spoil_register(node):
 
 
 @pytest.mark.parametrize(
-    "spoil, name, said",
+    "spoil, name, message",
     [
         (spoil_estop, "axis 0 interlock", "emergency stop pressed"),
         (spoil_limits, "axis 0 sensor", "amplitude 103, allowed 200 to 160"),
@@ -263,13 +263,13 @@ def spoil_register(node):
         (spoil_register, "bus", "wrong_values 50"),
     ],
 )
-def test_selftest_finds_and_names_what_is_wrong(spoil, name, said):
+def test_selftest_finds_and_names_what_is_wrong(spoil, name, message):
     node = FakeNode()
     spoil(node)
     call = Call("selftest", node)
-    assert f"FAILED   {name}" in call.out and said in call.out
+    assert f"FAILED   {name}" in call.out and message in call.out
     assert f"node 1 failed 1 of 8 checks: {name}" in sentence(call, 1)
-    reported = Call("selftest --json", node).told
+    reported = Call("selftest --json", node).results
     assert reported[0]["passed"] is False and [
         check["name"] for check in reported[0]["checks"] if not check["passed"]
     ] == [name]

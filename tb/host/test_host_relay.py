@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""moire.client.relay against a relay made of models: sets by hand, a noisy bus, power failures, and
+"""moire.client.relay with a relay made of models: sets by hand, a noisy bus, power failures, and
 every refusal.
 """
 
@@ -60,7 +60,7 @@ class FakeRelay(Transport):
             relay_set.RelaySet(k),
             chip or Flash(1 << 21),
         )
-        self.k, self.spoil, self.heard, self.passed, self.sent = k, spoil, [], 0.0, 0
+        self.k, self.spoil, self.received, self.passed, self.sent = k, spoil, [], 0.0, 0
         self.booting, self.sclk = 3, 0
 
     def clk(self, **strobes):
@@ -102,19 +102,19 @@ class FakeRelay(Transport):
         for word in self.spoil(list(words)):
             valid, data, command, good, *_ = self.check.step(1, word & 0xFF, word >> 8, 0)
             self.clk(valid=valid, data=data, command=command, good=good)
-        said = []
+        answer = []
         for _ in range(2000):
             if self.requests.answer_valid:
-                said.append(self.requests.answer)
+                answer.append(self.requests.answer)
             self.clk()
-            if self.requests.state == "listen":
+            if self.requests.state == "receive":
                 break
         for _ in range(4):
             self.clk()
-        self.heard = self.spoil(said)
+        self.received = self.spoil(answer)
 
     def receive(self, count, timeout_s):
-        words, self.heard = self.heard[:count], self.heard[count:]
+        words, self.received = self.received[:count], self.received[count:]
         self.passed += timeout_s if len(words) < count else 0
         return words
 
@@ -125,7 +125,7 @@ class FakeRelay(Transport):
         self.passed += seconds
 
 
-def awake():
+def awake_chip():
     chip = Flash(1 << 21)
     chip.asleep = False
     return chip
@@ -208,7 +208,7 @@ def test_too_many_orders_and_no_numbers_are_refused():
 
 
 def test_status_in_words():
-    relay = Relay(FakeRelay(chip=awake()))
+    relay = Relay(FakeRelay(chip=awake_chip()))
     relay.write(a_set())
     status = relay.status()
     assert status.orders == K and status.correction == -1.0 and status.position == 7
@@ -233,13 +233,13 @@ def test_a_set_for_other_hardware_is_refused_and_the_one_in_force_stays():
 
 
 def test_a_saved_set_is_in_both_copies_and_is_not_written_twice():
-    transport = FakeRelay(chip=awake())
-    relay, whole = Relay(transport), a_set()
-    relay.save(whole)
+    transport = FakeRelay(chip=awake_chip())
+    relay, relay_set = Relay(transport), a_set()
+    relay.save(relay_set)
     for address in (FIRST, SECOND):
-        assert transport.chip.memory[address : address + len(whole)] == whole
+        assert transport.chip.memory[address : address + len(relay_set)] == relay_set
     transport.chip.power = 0  # nothing more can be written
-    relay.save(whole)
+    relay.save(relay_set)
 
 
 def test_power_may_fail_anywhere_while_a_set_is_saved():
@@ -247,7 +247,7 @@ def test_power_may_fail_anywhere_while_a_set_is_saved():
     for power in [0, 4095, 4096, 4096 + 20, 2 * 4096 + len(new)] + [
         source.randrange(2 * 4096 + 2 * len(new)) for _ in range(4)
     ]:
-        transport = FakeRelay(chip=awake())
+        transport = FakeRelay(chip=awake_chip())
         Relay(transport).save(old)
         transport.chip.power = power
         try:
@@ -264,7 +264,7 @@ def test_power_may_fail_anywhere_while_a_set_is_saved():
 def test_a_noisy_bus_leads_to_the_same_set_or_to_an_error():
     source, done = random.Random(seed()), 0
     for _ in range(10):
-        transport = FakeRelay(chip=awake(), spoil=noise(source, 0.2))
+        transport = FakeRelay(chip=awake_chip(), spoil=noise(source, 0.2))
         try:
             relay = Relay(transport, tries=12, random_source=source)
             relay.write(a_set())
@@ -317,16 +317,16 @@ def test_no_answer_and_noise_are_different_errors():
 
 def call(transport, *words):
     """Runs a command as the command line does; returns what it prints."""
-    said = []
+    printed = []
 
-    class Heard(Call):
+    class Printing(Call):
         def say(self, values, text):
-            said.append((values, text))
+            printed.append((values, text))
 
     (planned,) = command_line.parse_call(["relay", *words])
     session = Session(planned.options, lambda options: transport)
-    planned.handler(Heard(session, planned), **planned.arguments)
-    return said[0]
+    planned.handler(Printing(session, planned), **planned.arguments)
+    return printed[0]
 
 
 def readings_file(tmp_path, amplitude=80.0):
@@ -339,7 +339,7 @@ def readings_file(tmp_path, amplitude=80.0):
 
 
 def test_relay_calibrate_writes_saves_and_draws(tmp_path):
-    transport, table = FakeRelay(chip=awake()), readings_file(tmp_path)
+    transport, table = FakeRelay(chip=awake_chip()), readings_file(tmp_path)
     reported, text = call(
         transport,
         "calibrate",
@@ -349,7 +349,7 @@ def test_relay_calibrate_writes_saves_and_draws(tmp_path):
         "--picture",
         str(tmp_path / "ring.png"),
     )
-    whole = make_set(terms_of(fit(read_readings(table), orders=K), 32768), Settings(32768), K)
+    relay_set = make_set(terms_of(fit(read_readings(table), orders=K), 32768), Settings(32768), K)
     assert (
         reported["orders"] == K
         and reported["before"] == pytest.approx(80)
@@ -357,14 +357,14 @@ def test_relay_calibrate_writes_saves_and_draws(tmp_path):
         and "saved in flash" in text
     )
     assert (
-        transport.set.identity == identity_of(whole)
-        and transport.chip.memory[SECOND : SECOND + len(whole)] == whole
+        transport.set.identity == identity_of(relay_set)
+        and transport.chip.memory[SECOND : SECOND + len(relay_set)] == relay_set
     )
     assert (tmp_path / "ring.png").read_bytes()[1:4] == b"PNG"
 
 
 def test_relay_calibrate_dry_and_with_a_bad_table_writes_nothing(tmp_path):
-    transport, table = FakeRelay(chip=awake()), readings_file(tmp_path)
+    transport, table = FakeRelay(chip=awake_chip()), readings_file(tmp_path)
     assert (
         "nothing written"
         in call(transport, "calibrate", str(table), "--counts", "32768", "--dry", "--orders", "3")[
@@ -378,7 +378,7 @@ def test_relay_calibrate_dry_and_with_a_bad_table_writes_nothing(tmp_path):
 
 
 def test_status_and_clear_report_flags():
-    transport = FakeRelay(chip=awake())
+    transport = FakeRelay(chip=awake_chip())
     transport.requests.flags = 6
     assert "flag: a whole turn without its index" in call(transport, "status")[1]
     assert call(transport, "clear")[0]["flags"] == 0

@@ -14,7 +14,7 @@ SEED = seed()
 IAC, SB, SE, COM_PORT = 0xFF, 0xFA, 0xF0, 44
 
 
-def ask(command, *value):
+def subnegotiation(command, *value):
     return bytes([IAC, SB, COM_PORT, command, *value, IAC, SE])
 
 
@@ -28,17 +28,24 @@ def server():
 )
 def test_each_parity_makes_its_ninth_bit(code, parity, ninths):
     port = server()
-    characters = port.feed(ask(3, code) + b"\x03\x01")
+    characters = port.feed(subnegotiation(3, code) + b"\x03\x01")
     assert [(character.byte, character.parity) for character in characters] == [
         (3, parity),
         (1, parity),
     ]
     assert tuple(character.ninth for character in characters) == ninths
-    assert port.take_answers() == ask(103, code) and port.take_answers() == b""
+    assert port.take_answers() == subnegotiation(103, code) and port.take_answers() == b""
 
 
 def test_characters_keep_the_parity_that_was_in_force_when_they_were_sent():
-    characters = server().feed(ask(3, 4) + b"\x21" + ask(3, 5) + b"\x04\x07" + ask(3, 4) + b"\x11")
+    characters = server().feed(
+        subnegotiation(3, 4)
+        + b"\x21"
+        + subnegotiation(3, 5)
+        + b"\x04\x07"
+        + subnegotiation(3, 4)
+        + b"\x11"
+    )
     assert [(character.byte, character.ninth) for character in characters] == [
         (0x21, 1),
         (4, 0),
@@ -52,22 +59,22 @@ def test_ff_is_doubled_both_ways():
     assert rfc2217.escaped(b"\x01\xff\x02") == b"\x01\xff\xff\x02"
 
 
-def test_settings_are_answered_and_zero_only_asks():
+def test_settings_are_answered_and_zero_only_reads():
     port = server()
     port.feed(
-        ask(1, 0, 0, 0, 0)
-        + ask(2, 0)
-        + ask(1, 0, 0, 0x25, 0x80)
-        + ask(1, 0, 0, 0, 0)
-        + ask(2, 8)
-        + ask(4, 2)
+        subnegotiation(1, 0, 0, 0, 0)
+        + subnegotiation(2, 0)
+        + subnegotiation(1, 0, 0, 0x25, 0x80)
+        + subnegotiation(1, 0, 0, 0, 0)
+        + subnegotiation(2, 8)
+        + subnegotiation(4, 2)
     )
     assert port.take_answers() == (
-        ask(101, 0, 1, 0xC2, 0)
-        + ask(102, 8)
-        + ask(101, 0, 0, 0x25, 0x80) * 2
-        + ask(102, 8)
-        + ask(104, 2)
+        subnegotiation(101, 0, 1, 0xC2, 0)
+        + subnegotiation(102, 8)
+        + subnegotiation(101, 0, 0, 0x25, 0x80) * 2
+        + subnegotiation(102, 8)
+        + subnegotiation(104, 2)
     )
     assert port.baud == 9600
 
@@ -90,17 +97,22 @@ def test_options_are_agreed_once_and_unknown_ones_declined():
 
 def test_a_purge_and_controls_are_answered_and_the_modem_state_reported():
     port = server()
-    port.feed(ask(12, 3) + ask(5, 8) + ask(11, 255, 255) + ask(99, 1))
-    assert port.take_answers() == ask(112, 3) + ask(105, 8) + bytes(
+    port.feed(
+        subnegotiation(12, 3)
+        + subnegotiation(5, 8)
+        + subnegotiation(11, 255, 255)
+        + subnegotiation(99, 1)
+    )
+    assert port.take_answers() == subnegotiation(112, 3) + subnegotiation(105, 8) + bytes(
         [IAC, SB, COM_PORT, 111, 255, 255, IAC, SE]
-    ) + ask(107, 0xB0)
+    ) + subnegotiation(107, 0xB0)
 
 
 def test_bytes_may_arrive_in_pieces():
-    stream = ask(3, 4) + b"\x21\xff\xff" + ask(3, 5) + b"\x04"
-    whole, pieces = server(), server()
-    assert whole.feed(stream) == sum((pieces.feed(bytes([byte])) for byte in stream), [])
-    assert whole.take_answers() == pieces.take_answers()
+    stream = subnegotiation(3, 4) + b"\x21\xff\xff" + subnegotiation(3, 5) + b"\x04"
+    at_once, pieces = server(), server()
+    assert at_once.feed(stream) == sum((pieces.feed(bytes([byte])) for byte in stream), [])
+    assert at_once.take_answers() == pieces.take_answers()
 
 
 def test_random_bytes_are_neither_stored_nor_stop_the_server():
@@ -117,6 +129,6 @@ def test_random_bytes_are_neither_stored_nor_stop_the_server():
         )
     port.feed(bytes([IAC, SE, IAC, SE]))
     port.take_answers()
-    assert [character.parity for character in port.feed(bytes([0]) + ask(3, 4) + b"\x55")][
-        -1
-    ] == "M"
+    assert [
+        character.parity for character in port.feed(bytes([0]) + subnegotiation(3, 4) + b"\x55")
+    ][-1] == "M"

@@ -40,7 +40,7 @@ def test_scope_settings_are_sent_in_counts():
 
 
 @pytest.mark.parametrize(
-    "wrong, said",
+    "wrong, message",
     [
         (dict(trigger="noon"), "no trigger 'noon': there are now, motion, settling, error, fault"),
         (dict(before=128), "0 to 127"),
@@ -49,9 +49,9 @@ def test_scope_settings_are_sent_in_counts():
         (dict(every="51ms"), "250us to 50ms"),
     ],
 )
-def test_wrong_scope_settings_are_not_sent(wrong, said):
+def test_wrong_scope_settings_are_not_sent(wrong, message):
     node = FakeNode()
-    with pytest.raises(OutOfRange, match=said):
+    with pytest.raises(OutOfRange, match=message):
         Scope(axis_of(node)).arm(**wrong)
     assert node.armed is None
 
@@ -129,7 +129,7 @@ def test_commands_arm_move_and_read_in_one_call(tmp_path):
         and len(rows) == 13
         and picture.read_bytes().startswith(b"\x89PNG")
     )
-    reported = Call(["scope", "arm", "--", "scope", "read", str(file), "--json"], node).told[1]
+    reported = Call(["scope", "arm", "--", "scope", "read", str(file), "--json"], node).results[1]
     assert reported["before"] == 0 and len(reported["position_nm"]) == 12
     assert (reported["command"], reported["action"]) == ("scope", "read") and len(
         reported["drive_command"]
@@ -185,11 +185,11 @@ def test_tune_without_a_file_drives_and_proposes():
     answering(node)
     call = Call("tune --bandwidth 40Hz --json", node)
     assert call.code == 0, call.err
-    plant = call.told[0]["plant"]
+    plant = call.results[0]["plant"]
     assert (
         plant["a"] == pytest.approx(math.exp(-0.25 / 8), abs=1e-4)
         and plant["delay"] == 0
         and plant["tick_s"] == 1 / 4000
     )
     assert plant["b"] / (1 - plant["a"]) == pytest.approx(50 / 4000, rel=0.001)
-    assert "enable" in node.executed and not node.axes[0].enabled and not call.told[0]["written"]
+    assert "enable" in node.executed and not node.axes[0].enabled and not call.results[0]["written"]

@@ -53,7 +53,7 @@ def test_a_table_is_read_with_its_units(file, lines):
 
 
 @pytest.mark.parametrize(
-    "lines, said",
+    "lines, message",
     [
         (["0, 0", "1, 100", "3, 20", "4, 30"], "line 3: from 1mm to 3mm a border is missing"),
         (
@@ -77,10 +77,10 @@ def test_a_table_is_read_with_its_units(file, lines):
         (["0, 0", "1,"], "line 2: the error is no number"),
     ],
 )
-def test_an_error_in_the_file_is_reported_with_its_line(file, lines, said):
+def test_an_error_in_the_file_is_reported_with_its_line(file, lines, message):
     with pytest.raises(BadFile) as reported:
         read_table(file(*lines))
-    assert said in str(reported.value)
+    assert message in str(reported.value)
 
 
 def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
@@ -136,7 +136,7 @@ def test_positions_count_from_the_zero_whatever_the_home_offset():
     assert node.axes[0].parameters[89] == 1000 * 65536 and segments.read() == table
 
 
-def test_without_a_zero_the_table_waits_and_says_why():
+def test_without_a_zero_the_table_waits_and_reports_why():
     node = node_with_table()
     node.axes[0].homed = False
     reported = Segments(axis_of(node)).load(SegmentTable(Fraction(0), Fraction(10**6), (0, 1)))
@@ -147,7 +147,7 @@ def test_without_a_zero_the_table_waits_and_says_why():
 
 
 @pytest.mark.parametrize(
-    "errors, said",
+    "errors, message",
     [
         (
             (0,) * 257,
@@ -156,11 +156,11 @@ def test_without_a_zero_the_table_waits_and_says_why():
         ((0, 200_000), "128 periods are the most"),
     ],
 )
-def test_a_table_that_does_not_fit_leaves_the_old_one_in_force(errors, said):
+def test_a_table_that_does_not_fit_leaves_the_old_one_in_force(errors, message):
     node = node_with_table()
     segments = Segments(axis_of(node))
     segments.load(SegmentTable(Fraction(0), Fraction(10**8), (0, 800)))
-    with pytest.raises(OutOfRange, match=said):
+    with pytest.raises(OutOfRange, match=message):
         segments.load(SegmentTable(Fraction(0), Fraction(10**8), errors))
     assert node.axes[0].points == [0, 65536] and node.axes[0].parameters[90] == 2
 
@@ -203,7 +203,8 @@ def test_the_commands_load_report_use_and_save(file, tmp_path):
         in call.out
     )
     assert (
-        Call("segments use linear -- segments status --json", node).told[-1]["in_force"] == "linear"
+        Call("segments use linear -- segments status --json", node).results[-1]["in_force"]
+        == "linear"
     )
     assert Call(["segments", "save", saved], node).out == f"3 segments saved in {saved}\n"
     assert read_table(saved).segments == 3
@@ -219,7 +220,7 @@ def test_a_wrong_file_is_one_sentence_and_nothing_is_written(file):
     assert node.axes[0].points == [] and not node.axes[0].writes
 
 
-def test_a_node_without_a_table_says_so_in_one_sentence(file):
+def test_a_node_without_a_table_reports_it_in_one_sentence(file):
     assert "this node was built without this function" in sentence(Call("segments status"), 1)
     assert "without a segment table" in sentence(Call(["segments", "load", str(file(*GOOD))]), 2)
 

@@ -168,7 +168,7 @@ def test_mark_parity_that_is_requested_and_missing_is_refused():
         ),
     ],
 )
-def test_a_port_that_does_not_open_says_why_in_one_sentence(error, sentence):
+def test_a_port_that_does_not_open_is_reported_with_the_reason_in_one_sentence(error, sentence):
     def open_port(*_, **__):
         raise error
 
@@ -195,17 +195,17 @@ def test_a_port_that_disappears_is_a_port_error():
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
 @pytest.mark.parametrize(
-    "parity, said",
+    "parity, message",
     [
         ("auto", "sends no parity bit"),
         ("odd", "sends no parity bit"),
         ("mark", "no MARK and SPACE parity"),
     ],
 )
-def test_a_port_that_drops_the_parity_bit_is_refused_and_not_trusted(parity, said):
+def test_a_port_that_drops_the_parity_bit_is_refused_and_not_trusted(parity, message):
     # what a pseudo terminal does
     near, far = os.openpty()
-    with pytest.raises(PortError, match=said):
+    with pytest.raises(PortError, match=message):
         SerialBus(os.ttyname(far), parity=parity)
     os.close(near)
     os.close(far)

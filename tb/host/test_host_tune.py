@@ -93,7 +93,7 @@ def test_a_plant_is_identified_from_few_uneven_samples(time_constant_s, gain, de
 
 
 @pytest.mark.parametrize(
-    "change, said",
+    "change, message",
     [
         (dict(count=20), "20 samples are too few"),
         (dict(noise=1e4), "too noisy"),
@@ -101,8 +101,8 @@ def test_a_plant_is_identified_from_few_uneven_samples(time_constant_s, gain, de
         (dict(gain=-50.0), "moves the axis down"),
     ],
 )
-def test_samples_without_information_are_refused(change, said):
-    with pytest.raises(tune.NotTuned, match=said):
+def test_samples_without_information_are_refused(change, message):
+    with pytest.raises(tune.NotTuned, match=message):
         tune.identify_samples(
             *sampled(**{**dict(time_constant_s=0.008, gain=50.0, delay_s=0.0), **change}), TICK
         )

@@ -138,7 +138,7 @@ def test_saved_settings_are_restored():
     assert panel.settings.get("turn_tries").counts == SETTINGS["turn_tries"].default
 
 
-def test_a_node_of_the_other_image_says_that_it_was_built_without():
+def test_a_node_of_the_other_image_reports_not_built():
     panel = Panel(FakeNode(Axis()))
     with pytest.raises(Refused, match="built without this function"):
         panel.settings.get("turn_direction")
@@ -171,7 +171,7 @@ def test_a_sub_node_counts_the_stations_of_its_list():
         panel.table.next_station(3)
 
 
-def test_the_commands_turn_the_table_and_say_where_it_is(tmp_path):
+def test_the_commands_turn_the_table_and_report_its_angle(tmp_path):
     panel, file = Panel(), tmp_path / "station.json"
     code, out, _ = panel.call("turn to 0.5deg -- turn status")
     assert (

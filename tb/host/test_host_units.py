@@ -75,7 +75,7 @@ def test_speeds_accelerations_and_times_are_read():
     assert units.NUMBER.parse("0.25") == Fraction(1, 4)
 
 
-def test_a_wrong_speed_says_what_is_allowed():
+def test_a_wrong_speed_is_refused_with_what_is_allowed():
     with pytest.raises(
         UnitError,
         match=r"'5mm' is no speed: write a number with pm/s nm/s um/s mm/s cm/s m/s, such as 5mm/s",

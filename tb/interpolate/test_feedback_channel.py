@@ -8,35 +8,9 @@ import pytest
 from cocotb.triggers import FallingEdge
 
 from tb.bench import run, start
+from tb.interpolate.feedback_inputs import INPUTS, SETTINGS
 
 LATENCY = 22  # cycles from an ADC word to its position; 1 more with a segment table
-SETTINGS = dict(
-    deglitch=0,
-    outlier_step=0,
-    outlier_hold=0,
-    amplitude_low=0,
-    amplitude_high=65535,
-    disagreement_limit=0,
-    encoder_fault_mask=0,
-)
-INPUTS = dict(
-    tick=0,
-    sample_tick=0,
-    sync=0,
-    now=0,
-    select=0,
-    write=0,
-    word=0,
-    wdata=0,
-    shift=0,
-    shift_periods=0,
-    a=0,
-    b=0,
-    z=0,
-    probe=0,
-    adc_sin=1,
-    adc_cos=1,
-)
 
 
 async def converted(dut):

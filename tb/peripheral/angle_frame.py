@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/angle_frame.sv does, in integers: step(...) is one clk and returns the pins
+"""Integer model of rtl/peripheral/angle_frame.sv: step(...) is one cycle and returns the pins
 after it.
 """
 
@@ -52,13 +52,16 @@ class AngleFrame:
         )
 
     def step(self, gap, stale_after, byte=None, framing_error=0, clear=0, rst=0):
-        whole, silent = len(self.bytes) == 8, self.silent
-        first = byte == 0xA5 and (whole or not self.bytes)
-        inside = self.bytes and not whole
+        complete, silent = len(self.bytes) == 8, self.silent
+        first = byte == 0xA5 and (complete or not self.bytes)
+        inside = self.bytes and not complete
         self.valid, self.age, elapsed = 0, min(self.age + 1, LONGEST), self.elapsed
         self.silent = 0 if byte is not None else min(silent + 1, 0xFFFFFF)
         self.elapsed = 1 if first else min(elapsed + 1, LONGEST)
-        if whole and frame(self.bytes[1], int.from_bytes(self.bytes[2:6], "little")) == self.bytes:
+        if (
+            complete
+            and frame(self.bytes[1], int.from_bytes(self.bytes[2:6], "little")) == self.bytes
+        ):
             self.missed = (
                 self.count(self.missed, (self.bytes[1] - self.number - 1) % 256)
                 if self.known
@@ -69,11 +72,11 @@ class AngleFrame:
                 int.from_bytes(self.bytes[2:6], "little"),
                 min(elapsed + 1, LONGEST),
             )
-        elif whole:
+        elif complete:
             self.crc_errors = self.count(self.crc_errors)
         if inside and (framing_error or byte is None and silent >= gap):
             self.broken, self.bytes = self.count(self.broken), b""
-        elif whole or not self.bytes:
+        elif complete or not self.bytes:
             self.bytes = b"\xa5" if first else b""
         elif byte is not None:
             self.bytes += bytes([byte])

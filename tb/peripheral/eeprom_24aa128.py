@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A Microchip 24AA128 on its lines: 16 KiB, pages of 64 bytes, busy (no acknowledge) while it
-writes.
+"""A Microchip 24AA128 on the lines of a bus: 16 KiB, pages of 64 bytes, busy (no acknowledge) while
+it writes.
 
-step(scl, sda) is one clk and returns (scl_low, sda_low)."""
+step(scl, sda) is one cycle and returns (scl_low, sda_low).
+"""
 
 SIZE, PAGE = 16384, 64
 
@@ -12,7 +13,7 @@ class Eeprom:
         self.address, self.write_clk, self.stretch = address, write_clk, stretch
         self.memory = bytearray(b"\xff" * SIZE)
         self.state, self.sda_low, self.scl_low, self.busy, self.last = "idle", 0, 0, 0, (1, 1)
-        self.bits, self.place, self.page, self.writes, self.pointer = [], 0, {}, 0, 0
+        self.bits, self.page, self.writes, self.pointer = [], {}, 0, 0
 
     def step(self, scl, sda):
         (scl_before, sda_before), self.last = self.last, (scl, sda)
@@ -33,8 +34,8 @@ class Eeprom:
         if (
             self.state == "data" and self.page and not self.bits[1:]
         ):  # at the border of a byte; the stop's own edge came before
-            for place, byte in self.page.items():
-                self.memory[place] = byte
+            for address, byte in self.page.items():
+                self.memory[address] = byte
             self.busy, self.writes = self.write_clk, self.writes + 1
         self.state, self.sda_low, self.page = "idle", 0, {}
 
@@ -44,7 +45,7 @@ class Eeprom:
             self.sda_low = int(self.take(sum(b << 7 - n for n, b in enumerate(self.bits))))
             self.scl_low = self.stretch
         elif self.state == "read" and len(self.bits) == 9 and self.bits[8]:
-            self.state = "idle"  # not acknowledged: enough
+            self.state = "idle"  # not acknowledged: the read ends
         if len(self.bits) == 9:
             self.bits = []
             if self.state == "answer":
@@ -55,7 +56,7 @@ class Eeprom:
             self.sda_low = 1 - (self.memory[self.pointer] >> 7 - len(self.bits) & 1)
 
     def take(self, byte):
-        """A byte has come; whether it is acknowledged."""
+        """Take a byte; returns whether it is acknowledged."""
         if self.state == "address":
             mine = byte >> 1 == self.address and not self.busy
             self.state = "idle" if not mine else "answer" if byte & 1 else "high"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/i2c_master.sv does, in integers: step(...) is one clk and returns the pins
+"""Integer model of rtl/peripheral/i2c_master.sv: step(...) is one cycle and returns the pins
 after it.
 """
 

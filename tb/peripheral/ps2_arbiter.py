@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/ps2_arbiter.sv does, in integers. wires(...) is what stands on the outputs
-for these inputs; step(...) is one clk.
-
+"""Integer model of rtl/peripheral/ps2_arbiter.sv. wires(...) returns the outputs for these inputs;
+step(...) is one cycle.
 The inputs are one tuple of Inputs, a byte is (value, damaged) or None."""
 
 from typing import NamedTuple, Optional
@@ -31,7 +30,7 @@ class Ps2Arbiter:
         self.reset()
 
     def reset(self):
-        self.part = self.quiet = self.left = self.awaited = self.ordered = self.stood = (
+        self.part = self.quiet = self.left = self.awaited = self.ordered = self.waited = (
             self.injecting
         ) = self.own = self.again = 0
 
@@ -50,8 +49,8 @@ class Ps2Arbiter:
         return resend, active, is_open, may
 
     def arrived(self, i):
-        """The byte of the keyboard that stands since this clk, if it is sound."""
-        return i.keyboard[0] if i.keyboard and not self.stood and not i.keyboard[1] else None
+        """The byte of the keyboard that is new in this cycle, if it is undamaged."""
+        return i.keyboard[0] if i.keyboard and not self.waited and not i.keyboard[1] else None
 
     def wires(self, i):
         """(keyboard_hold, command, host_ready, send, keyboard_ready, inject_ready, injecting,
@@ -84,7 +83,7 @@ class Ps2Arbiter:
         arrived = self.arrived(i)
         given_up = self.quiet >= LONGEST
         end = self.part == self.ms - 1
-        self.stood = int(bool(i.keyboard))
+        self.waited = int(bool(i.keyboard))
         self.quiet = 0 if active else min(self.quiet + end, 0xFFFF)
         self.part = 0 if active or end else self.part + 1
         if i.command_sent:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/ps2_device.sv does, in integers. pins(...) is what stands on the outputs;
-step(...) is one clk.
+"""Integer model of rtl/peripheral/ps2_device.sv. pins(...) returns the outputs; step(...) is one
+cycle.
 """
 
 from tb.peripheral.ps2_host import frame
@@ -14,11 +14,11 @@ class Ps2Device:
         self.reset()
 
     def reset(self):
-        self.state, self.elapsed, self.quarter, self.place = "release", 0, 0, 0
+        self.state, self.elapsed, self.quarter, self.bit = "release", 0, 0, 0
         self.clock_low = self.data_low = self.valid = self.aborted = 0
 
     def eleventh(self):
-        return self.elapsed == self.length - 1 and self.quarter == 0 and self.place == 10
+        return self.elapsed == self.length - 1 and self.quarter == 0 and self.bit == 10
 
     def pins(self, clock):
         """(send_ready, valid, received, damaged, aborted, busy, clock_low, data_low); received and
@@ -36,7 +36,7 @@ class Ps2Device:
         )
 
     def step(self, clock, data, send=None, damaged=0, ready=0, rst=0):
-        self.aborted, stands = 0, self.valid
+        self.aborted, waiting = 0, self.valid
         if self.valid and ready:
             self.valid = 0
         if self.state == "idle":
@@ -44,8 +44,8 @@ class Ps2Device:
                 self.elapsed >= self.free,
                 min(self.elapsed + 1, self.free) if clock else 0,
             )
-            if clock and free and (not stands if not data else send is not None):
-                self.state, self.elapsed, self.quarter, self.place = (
+            if clock and free and (not waiting if not data else send is not None):
+                self.state, self.elapsed, self.quarter, self.bit = (
                     "send" if data else "receive",
                     0,
                     0,
@@ -59,7 +59,7 @@ class Ps2Device:
                 self.state = "idle"
         else:
             last = self.elapsed == self.length - 1
-            if not clock and (self.quarter == 0 or self.quarter == 3 and last and self.place < 10):
+            if not clock and (self.quarter == 0 or self.quarter == 3 and last and self.bit < 10):
                 self.state, self.elapsed, self.clock_low, self.data_low, self.aborted = (
                     "idle",
                     0,
@@ -81,11 +81,11 @@ class Ps2Device:
                 if self.quarter == 3:
                     if self.state == "receive":
                         self.bits.append(data)
-                        self.data_low = int(self.place == 9 and data)
+                        self.data_low = int(self.bit == 9 and data)
                     else:
-                        self.data_low = 1 - self.bits[self.place]
-                    self.place += 1
-                    self.state = "release" if self.place == 11 else self.state
+                        self.data_low = 1 - self.bits[self.bit]
+                    self.bit += 1
+                    self.state = "release" if self.bit == 11 else self.state
                 self.quarter = (self.quarter + 1) % 4
         if rst:
             self.reset()

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/ps2_host.sv does, in integers. pins() is what stands on the outputs;
-step(...) is one clk.
-"""
+"""Integer model of rtl/peripheral/ps2_host.sv. pins() returns the outputs, step(...) is a cycle."""
 
 
 def frame(byte, damaged=0):

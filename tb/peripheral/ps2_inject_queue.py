@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/ps2_inject_queue.sv does: outputs(injecting) are those in a clk, step(…) is
-the clk.
+"""Integer model of rtl/peripheral/ps2_inject_queue.sv: outputs(injecting) returns the outputs in a
+cycle, step(…) is the cycle.
 """
 
 from tb.serial.sync_fifo import SyncFifo

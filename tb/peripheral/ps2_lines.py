@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A PS/2 keyboard and a PS/2 host as the interface's description has them, each the judge of the
+"""A PS/2 keyboard and a PS/2 host as the description of the interface defines them. Each checks the
 other side.
 
-Both are stepped once a clk with the levels of their lines, and pull them by clock_low and
+Both are stepped once a cycle with the levels of their lines, and pull them by clock_low and
 data_low."""
 
 import random
@@ -27,8 +27,8 @@ class Party:
 
 
 class Keyboard(Party):
-    """Sends what is put into `outbox`, answers commands; `half` is its half bit in us. A share of
-    its frames can be damaged.
+    """Sends the bytes of `outbox` and answers commands. `half` is half a bit in us, `damage` the
+    fraction of its frames that it damages.
     """
 
     def __init__(self, clk_hz, half=40, damage=0.0):
@@ -41,11 +41,11 @@ class Keyboard(Party):
         while True:
             free = free + 1 if self.clock else 0
             if free > 50 * self.us and not self.data:
-                yield from self.hear()
+                yield from self.receive()
                 free = 0
             elif free > 50 * self.us and (self.answers or self.outbox):
                 queue = self.answers or self.outbox
-                if (yield from self.say(queue[0])):
+                if (yield from self.send(queue[0])):
                     self.last = queue.pop(0)
                 free = 0
             yield
@@ -63,7 +63,7 @@ class Keyboard(Party):
         yield from self.wait(self.half / 2)
         return True
 
-    def say(self, byte):
+    def send(self, byte):
         for bit in frame(byte, random.random() < self.damage):
             self.data_low = 1 - bit
             if not (yield from self.pulse()):
@@ -71,10 +71,10 @@ class Keyboard(Party):
                 return False
         return True
 
-    def hear(self):
+    def receive(self):
         bits = []
-        for place in range(11):
-            self.data_low = int(place == 10 and bits[9])
+        for bit in range(11):
+            self.data_low = int(bit == 10 and bits[9])
             if not (yield from self.pulse()):
                 self.data_low = 0
                 return
@@ -96,14 +96,14 @@ class Keyboard(Party):
 
 
 class Host(Party):
-    """Keeps in `heard` what it hears, sends what is put into `orders`, asks for damaged bytes
-    again. cut: the share of bits after which
-    it pulls the clock; rest: it does so after each byte."""
+    """Collects the bytes in `received`, sends those of `orders`, and requests damaged bytes again.
+    `cut` is the fraction of bits after which it pulls the clock; with `pause` it pulls the clock
+    for this time in us after each byte."""
 
-    def __init__(self, clk_hz, cut=0.0, rest=0):
+    def __init__(self, clk_hz, cut=0.0, pause=0):
         super().__init__(clk_hz)
-        self.cut, self.rest = cut, rest
-        self.heard, self.at, self.orders, self.damaged, self.unanswered, self.now = (
+        self.cut, self.pause = cut, pause
+        self.received, self.at, self.orders, self.damaged, self.unanswered, self.now = (
             [],
             [],
             [],
@@ -125,7 +125,7 @@ class Host(Party):
                 elif random.random() < self.cut:
                     yield from self.wait(
                         random.uniform(1, 75 if len(bits) < 10 else 60)
-                    )  # no device can tell a cut at its last edge
+                    )  # a device cannot detect a cut at its last edge
                     yield from self.pull(random.uniform(100, 400))
                     bits = []
                 before = self.clock
@@ -145,11 +145,11 @@ class Host(Party):
     def judge(self, bits):
         byte = sum(b << n for n, b in enumerate(bits[1:9]))
         if bits == frame(byte):
-            self.heard.append(byte)
+            self.received.append(byte)
             self.at.append(self.now)
-            if self.rest:
+            if self.pause:
                 yield from self.wait(60)
-                yield from self.pull(self.rest)
+                yield from self.pull(self.pause)
         else:
             self.damaged += 1
             self.orders.insert(0, 0xFE)

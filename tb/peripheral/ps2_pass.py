@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/ps2_pass.sv does: the models of its parts, wired as the parts are. step(...)
-is one clk and returns the pulls after it,
+"""Integer model of rtl/peripheral/ps2_pass.sv: the models of its parts, connected as the parts are.
+step(...) is one cycle and returns the pulls after it,
 (keyboard clock, keyboard data, host clock, host data)."""
 
 from tb.common.synchroniser import Synchroniser
@@ -23,7 +23,7 @@ class Ps2Pass:
         )
 
     def inputs(self, idle_ms, inject):
-        """What the arbiter sees, and its answers."""
+        """The inputs of the arbiter, and its answers."""
         _, valid, byte, damaged, sent, unsent, _, busy, _, _ = self.host.pins()
         send_ready, host_valid, order, order_damaged, *_ = self.device.pins(self.lines[2])
         seen = Inputs(
@@ -42,7 +42,7 @@ class Ps2Pass:
         return seen._replace(keyboard_held=int(self.host.rested() and command is None))
 
     def typed(self):
-        """Whether a byte of the keyboard that answers no command came with the last clk."""
+        """Whether a byte of the keyboard that answers no command came in the last cycle."""
         return self.arbiter.wires(self.inputs(0, None))[7]
 
     def step(self, lines, idle_ms, inject, rst=0):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/spi_word_sender.sv does, in integers: step(...) is one clk and returns
+"""Integer model of rtl/peripheral/spi_word_sender.sv: step(...) is one cycle and returns
 (ready, cs_n, sclk, sdi, sent) after it.
 """
 
@@ -8,7 +8,7 @@ BITS, RAISE, HALVES = 16, 33, 36  # half periods of sclk in a word: before cs_n 
 
 class SpiWordSender:
     def __init__(self):
-        self.word, self.age = 0, None  # age: clk since the word was taken, None: ready
+        self.word, self.age = 0, None  # age: cycles since the word was taken, None: ready
 
     def step(self, valid, word, half_period, rst=0):
         if rst:
@@ -24,12 +24,12 @@ class SpiWordSender:
     def pins(self):
         if self.age is None:
             return 1, 1, 0, self.word & 1, 0
-        half, rest = divmod(self.age, self.length)
+        half, remainder = divmod(self.age, self.length)
         sdi = self.word >> BITS - 1 - min(half // 2, BITS - 1) & 1
         return (
             0,
             int(half >= RAISE),
             int(half % 2 and half < RAISE),
             sdi,
-            int(half == RAISE and rest == 0),
+            int(half == RAISE and remainder == 0),
         )

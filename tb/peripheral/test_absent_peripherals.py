@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""peripherals: what is not built is idle, whatever is written and whatever comes at the pins; the
-register `built` reports it.
+"""peripherals: a peripheral that is not built stays idle, whatever is written and whatever its pins
+do; the register `built` reports it.
 """
 
 import random
@@ -57,7 +57,7 @@ async def absent_peripherals_are_idle(dut):
     await bench.start(dut, select=0, write=0, word=0, wdata=0, **dict.fromkeys(INPUTS, 0))
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
-    awake = set()
+    active = set()
     # at the beginning, since the random settings and levels below may make both ports wait
     for word, value in ((I2C, RECOVER << 8), (BIT_TIME, 2 << 4), (TRANSMIT, 0)):
         dut.select.value, dut.write.value, dut.word.value, dut.wdata.value = 1, 1, word, value
@@ -73,8 +73,8 @@ async def absent_peripherals_are_idle(dut):
         for bit, idle in enumerate(IDLE):
             for name, level in idle.items():
                 if int(getattr(dut, name).value) != level:
-                    awake.add(bit)
-    assert awake == {bit for bit, outputs in enumerate(IDLE) if built >> bit & 1 and outputs}, (
+                    active.add(bit)
+    assert active == {bit for bit, outputs in enumerate(IDLE) if built >> bit & 1 and outputs}, (
         "what was built, and only that, moves"
     )
     dut.write.value, dut.word.value = 0, BUILT

@@ -83,7 +83,7 @@ async def one_frame_by_hand(dut):
 async def latency_is_2_and_age_counts_from_the_first_byte(dut):
     line = await Line(dut).begin()
     data = frame(1, 0xFFFFFFFF)
-    await line.send(data[:7], pause=3)  # 28 clk
+    await line.send(data[:7], pause=3)  # 28 cycles
     assert (await line.clk(data[7]))[0] == 0
     got = await line.clk()
     assert got[0] == 1 and got[3] == 28 + 2
@@ -99,23 +99,23 @@ async def latency_is_2_and_age_counts_from_the_first_byte(dut):
 async def any_damaged_byte_costs_one_frame(dut):
     line = await Line(dut).begin()
     await line.send(frame(0, 1))
-    for place in range(8):
+    for index in range(8):
         for bit in range(8):
             bad = bytearray(frame(1, 0xA5A5A5A5 if bit == 3 else 0x01020304))
-            bad[place] ^= 1 << bit
+            bad[index] ^= 1 << bit
             await line.send(bad)
             await line.clk(n=GAP + 2)
             line.angles.clear()
             await line.send(frame(0, 77))
             await line.clk(n=GAP + 2)
-            assert line.angles == [(77, 0)], (place, bit)
+            assert line.angles == [(77, 0)], (index, bit)
 
 
 @cocotb.test()
 async def kinds_of_errors_are_counted_apart(dut):
     line = await Line(dut).begin()
     await line.send(frame(250, 5))
-    await line.send(frame(4, 6))  # nine lie between
+    await line.send(frame(4, 6))  # nine frames are missing
     assert (await line.clk())[5:] == (0, 0, 9)
     await line.send(frame(5, 6)[:7] + b"\x00")
     assert (await line.clk())[5:] == (1, 0, 9)
@@ -124,7 +124,11 @@ async def kinds_of_errors_are_counted_apart(dut):
     assert (await line.clk(n=2))[5:] == (1, 1, 9)
     await line.send(frame(6, 6)[:4])
     assert (await line.clk(framing_error=1))[5:] == (1, 2, 9)
-    assert (await line.clk(framing_error=1))[5:] == (1, 2, 9)  # outside a frame it is no frame's
+    assert (await line.clk(framing_error=1))[5:] == (
+        1,
+        2,
+        9,
+    )  # outside a frame it belongs to no frame
     assert (await line.clk(clear=1))[5:] == (0, 0, 0)
     await line.send(frame(4, 6))  # the same number again: 255 are missing
     for _ in range(2):

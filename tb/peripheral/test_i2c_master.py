@@ -91,15 +91,15 @@ class Bus:
         for _ in range(clks):
             await self.clk()
 
-    async def write(self, place, data):
+    async def write(self, address, data):
         """A page of the EEPROM; ends with the stop that begins its write time."""
         assert await self.do(START) == OK
-        for byte in (0xA0, place >> 8, place & 255, *data):
+        for byte in (0xA0, address >> 8, address & 255, *data):
             assert await self.do(WRITE, byte) == OK
         assert await self.do(STOP) == OK
 
     async def poll(self):
-        """Address it until it acknowledges: how often it did not."""
+        """Address the device until it acknowledges; returns how often it did not."""
         tries = 0
         while True:
             assert await self.do(START) == OK
@@ -111,12 +111,12 @@ class Bus:
             await self.do(STOP)
             tries += 1
 
-    async def read(self, place, length):
+    async def read(self, address, length):
         assert [
             await self.do(START),
             await self.do(WRITE, 0xA0),
-            await self.do(WRITE, place >> 8),
-            await self.do(WRITE, place & 255),
+            await self.do(WRITE, address >> 8),
+            await self.do(WRITE, address & 255),
             await self.do(START),
             await self.do(WRITE, 0xA1),
         ] == [OK] * 6
@@ -129,7 +129,7 @@ class Bus:
 
 
 def edges(samples):
-    """The wires as words: S, P, or the level of data at each rise of the clock."""
+    """The bus as a list: S, P, or the level of data at each rise of the clock."""
     words = ""
     for before, now in zip(samples, samples[1:]):
         if before & now & 1 and (before ^ now) & 2:
@@ -163,7 +163,7 @@ async def latency_is_about_1_bit_for_start_and_stop_and_9_bits_for_a_byte(dut):
 
 
 @cocotb.test()
-async def the_times_of_the_bus_are_kept(dut):
+async def the_times_of_the_bus_are_observed(dut):
     """UM10204, table 10, in us: low, high, set-up and hold of a start, set-up of a stop, free
     before a start, set-up of data.
     """
@@ -200,7 +200,7 @@ async def an_eeprom_takes_a_page_and_is_polled_until_it_is_written(dut):
     device = Eeprom(write_clk=CLK_HZ // 1000)
     bus = await Bus(dut, device).begin()
     data = bytes(random.getrandbits(8) for _ in range(10))
-    await bus.write(0x0FC0 + 58, data)  # runs over the end of its page, as the real one
+    await bus.write(0x0FC0 + 58, data)  # rolls over at the end of its page, as the device does
     assert device.writes == 1 and await bus.poll() > 0
     assert (
         device.memory[0x0FC0 + 58 : 0x1000] == data[:6] and device.memory[0x0FC0:0x0FC4] == data[6:]
@@ -211,7 +211,7 @@ async def an_eeprom_takes_a_page_and_is_polled_until_it_is_written(dut):
         await bus.do(START) == OK
         and await bus.do(WRITE, 0xA2) == NOT_ACKNOWLEDGED
         and await bus.do(STOP) == OK
-    )  # nobody there
+    )  # no device has this address
 
 
 @cocotb.test()

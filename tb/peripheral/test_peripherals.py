@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""peripherals: each one end to end, from its registers to the devices at its pins: an EEPROM, a
-keyboard and its machine, a peer, an angle sensor, a numeric display, two lamps.
+"""peripherals: each peripheral end to end, from its registers to the device at its pins: an EEPROM,
+a keyboard and its machine, a peer, an angle sensor, a numeric display, two lamps.
 """
 
 import random
@@ -18,7 +18,7 @@ from tb.peripheral.test_i2c_master import edges
 
 CLK_HZ = 1_000_000
 MS = CLK_HZ // 1000
-BIT = 16  # clk, of both serial ports
+BIT = 16  # cycles, of both serial ports
 CUT = [0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14]  # S4: left Ctrl + W
 REGISTERS = {}
 for field in FIELDS:
@@ -26,11 +26,11 @@ for field in FIELDS:
         REGISTERS.setdefault(field.register, {})[field.field] = field
 
 
-class SerialBus:
-    """Characters of 8N1 onto a pin, and off one."""
+class SerialPort:
+    """Sends and receives 8N1 characters on two pins."""
 
     def __init__(self):
-        self.levels, self.heard, self.place, self.shifted = [], [], None, 0
+        self.levels, self.received, self.sample, self.shifted = [], [], None, 0
 
     def send(self, data, stop=1):
         for byte in data:
@@ -43,17 +43,17 @@ class SerialBus:
     def level(self):
         return self.levels.pop(0) if self.levels else 1
 
-    def hear(self, level):
-        if self.place is None:
-            self.place = 0 if not level else None
+    def receive(self, level):
+        if self.sample is None:
+            self.sample = 0 if not level else None
         else:
-            self.place += 1
-            if self.place % BIT == BIT // 2:
+            self.sample += 1
+            if self.sample % BIT == BIT // 2:
                 self.shifted = self.shifted >> 1 | level << 9
-            if self.place == 9 * BIT + BIT // 2:
+            if self.sample == 9 * BIT + BIT // 2:
                 assert self.shifted & 1 == 0 and self.shifted >> 9, "no start or stop bit"
-                self.heard.append(self.shifted >> 1 & 0xFF)
-                self.place = None
+                self.received.append(self.shifted >> 1 & 0xFF)
+                self.sample = None
 
 
 class Peripherals:
@@ -71,8 +71,8 @@ class Peripherals:
             bytearray(),
         )  # I2C: lines that something holds low, samples of both
         self.peer, self.sensor, self.lamps, self.display, self.shown = (
-            SerialBus(),
-            SerialBus(),
+            SerialPort(),
+            SerialPort(),
             0,
             (1, 0),
             [],
@@ -104,9 +104,9 @@ class Peripherals:
     async def clk(self, n=1):
         for _ in range(n):
             await FallingEdge(self.dut.clk)
-            self.around()
+            self.step_devices()
 
-    def around(self):
+    def step_devices(self):
         d, k, m, e = self.dut, self.keyboard, self.machine, self.eeprom
         pulls = int(d.i2c_scl_low.value), int(d.i2c_sda_low.value)
         lines = [
@@ -123,7 +123,7 @@ class Peripherals:
             1 - (int(d.edm_clock_low.value) | m.clock_low),
             1 - (int(d.edm_data_low.value) | m.data_low),
         )
-        self.peer.hear(int(d.peer_tx.value))
+        self.peer.receive(int(d.peer_tx.value))
         self.look(int(d.display_cs_n.value), int(d.display_sclk.value))
         inputs = dict(
             i2c_scl=lines[0],
@@ -141,7 +141,9 @@ class Peripherals:
                 getattr(d, name).value = level
 
     def look(self, cs_n, sclk):
-        """As a MAX7219: a bit at each rise of sclk, the word at that of cs_n."""
+        """Read the pins as a MAX7219 does: a bit at each rise of sclk, the word at the rise of
+        cs_n.
+        """
         before, self.display = self.display, (cs_n, sclk)
         if sclk and not before[1]:
             self.bits.append(int(self.dut.display_data.value))
@@ -154,7 +156,7 @@ class Peripherals:
         d.select.value, d.write.value, d.word.value, d.wdata.value = 1, write, offset // 4, wdata
         await self.clk()
         d.select.value = 0
-        return int(d.rdata.value.resolve("zeros"))  # what never came has no value
+        return int(d.rdata.value.resolve("zeros"))  # a value that never came is undefined
 
     async def write(self, register, **values):
         fields = REGISTERS[register]
@@ -249,11 +251,11 @@ async def a_person_types_and_a_cut_is_started_after_it(dut):
         await peripherals.write("ps2_inject", data=byte, last=int(n == len(CUT) - 1))
     await peripherals.clk(MS)
     assert (await peripherals.read("ps2_state"))["free"] == 32 - len(CUT)
-    await peripherals.until(lambda: len(peripherals.machine.heard) == 4)
+    await peripherals.until(lambda: len(peripherals.machine.received) == 4)
     assert (await peripherals.read("ps2_state"))["injecting"] == 1
-    await peripherals.until(lambda: len(peripherals.machine.heard) == 9)
+    await peripherals.until(lambda: len(peripherals.machine.received) == 9)
     await peripherals.clk(MS)
-    assert peripherals.machine.heard == [0x1C, 0xF0, 0x1C, *CUT]
+    assert peripherals.machine.received == [0x1C, 0xF0, 0x1C, *CUT]
     assert await peripherals.read("ps2_state") == dict(free=32, injecting=0, busy=0)
     assert await peripherals.read("ps2_typed") == 3
     assert (
@@ -269,13 +271,13 @@ async def keys_are_taken_back_but_for_the_sequence_that_is_under_way(dut):
     for _ in range(3):
         for n, byte in enumerate(CUT):
             await peripherals.write("ps2_inject", data=byte, last=int(n == len(CUT) - 1))
-    await peripherals.until(lambda: len(peripherals.machine.heard) == 2)
+    await peripherals.until(lambda: len(peripherals.machine.received) == 2)
     await peripherals.write("ps2_state", drop=1)
     await peripherals.clk(4)
     assert (await peripherals.read("ps2_state"))["free"] <= 32 - 3 * len(CUT) + 3
-    await peripherals.until(lambda: len(peripherals.machine.heard) == len(CUT))
+    await peripherals.until(lambda: len(peripherals.machine.received) == len(CUT))
     await peripherals.clk(60 * MS)
-    assert peripherals.machine.heard == CUT and await peripherals.read("ps2_state") == dict(
+    assert peripherals.machine.received == CUT and await peripherals.read("ps2_state") == dict(
         free=32, injecting=0, busy=0
     )
 
@@ -291,7 +293,7 @@ async def errors_of_the_keyboard_are_counted_and_cleared(dut):
         "keyboard_damaged"
     ] >= 2 and await peripherals.read("ps2_typed") == 0
     peripherals.keyboard.damage = 0.0
-    await peripherals.until(lambda: peripherals.machine.heard == [0x1C])
+    await peripherals.until(lambda: peripherals.machine.received == [0x1C])
     await peripherals.write("ps2_errors")
     assert not any((await peripherals.read("ps2_errors")).values())
 
@@ -304,16 +306,16 @@ async def bytes_pass_to_and_from_the_peer(dut):
         await peripherals.write("peer_transmit", value=byte)
     assert (await peripherals.read("peer_state"))["sending"] == 1
     peripherals.peer.send(back)
-    await peripherals.until(lambda: len(peripherals.peer.heard) == 64)
+    await peripherals.until(lambda: len(peripherals.peer.received) == 64)
     await peripherals.clk(2 * BIT)
-    assert bytes(peripherals.peer.heard) == there and await peripherals.read("peer_state") == dict(
-        transmit_free=64, sending=0
-    )
-    heard = []
+    assert bytes(peripherals.peer.received) == there and await peripherals.read(
+        "peer_state"
+    ) == dict(transmit_free=64, sending=0)
+    received = []
     while (word := await peripherals.read("peer_receive"))["present"]:
-        heard.append(word["data"])
+        received.append(word["data"])
         await peripherals.clk(2)
-    assert bytes(heard) == back
+    assert bytes(received) == back
     assert await peripherals.read("peer_errors") == dict(framing=0, overruns=0)
 
 

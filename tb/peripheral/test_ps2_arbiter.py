@@ -47,7 +47,7 @@ class Side:
         return self
 
     async def clk(self, rst=0, n=1, **inputs):
-        """n clk with these inputs; the wires of the last one."""
+        """Run n cycles with these inputs; returns the wires of the last one."""
         d, i = self.dut, Inputs(**inputs)
         for name in (
             "idle_ms",
@@ -93,13 +93,13 @@ class Side:
         return got
 
     async def typed(self, *keys, **more):
-        """Bytes of the keyboard, each passed on at once."""
+        """Send bytes of the keyboard, each passed on at once."""
         for key in keys:
             assert (await self.clk(keyboard=(key, 0), send_ready=1, **more))[3:5] == ((key, 0), 1)
             await self.clk(**more)
 
     async def order(self, command, **more):
-        """A command of the host, taken by the keyboard."""
+        """Send a command of the host, which the keyboard takes."""
         assert (await self.clk(host=(command, 0), command_ready=1, **more))[1:3] == (
             (command, 0),
             1,
@@ -228,12 +228,12 @@ async def a_resend_after_an_injected_byte_is_answered_here(dut):
     assert (await side.clk(host=(0xFE, 0)))[1:3] == (
         (0xFE, 0),
         0,
-    )  # the keyboard's byte: its own affair
+    )  # a byte of the keyboard, unrelated to the command
     assert (await side.clk(host=(0xFE, 1)))[1:3] == ((0xFE, 1), 0)
 
 
 @cocotb.test()
-async def what_is_typed_is_told_from_answers(dut):
+async def what_is_typed_is_distinguished_from_answers(dut):
     side = await Side(dut).begin()
     assert (await side.clk(keyboard=(0x1C, 0)))[7] == 1
     assert (await side.clk(keyboard=(0x1C, 0), send_ready=1))[7] == 0  # once

@@ -18,7 +18,7 @@ BIT = round(80 * US)
 
 
 class Side:
-    """The design and its model on lines that a host may pull too, clk by clk."""
+    """The design and its model on lines that a host may pull too, cycle by cycle."""
 
     def __init__(self, dut):
         self.dut, self.model = dut, Ps2Device(CLK_HZ)
@@ -72,19 +72,21 @@ class Side:
         await self.clk(n=BIT)
 
     async def command(self, bits, cut=None):
-        """A host's command: ten bits after the request. cut: pull the clock after so many edges."""
+        """Send a command of the host: ten bits after the request. With `cut` the host pulls the
+        clock after that many edges.
+        """
         await self.clk(pull_clock=1, n=round(110 * US))
         await self.clk(pull_clock=1, pull_data=1, n=round(10 * US))
         self.edges.clear()
-        low, place = 1, 0
+        low, bit = 1, 0
         for _ in range(round(1200 * US)):
-            if len(self.edges) > place:
-                place = len(self.edges)
-                if place == cut:
+            if len(self.edges) > bit:
+                bit = len(self.edges)
+                if bit == cut:
                     await self.clk(pull_clock=1, n=round(120 * US))
                     return None
                 await self.clk(pull_data=low, n=round(10 * US))
-                low = 1 - bits[place - 1] if place <= 10 else 0
+                low = 1 - bits[bit - 1] if bit <= 10 else 0
             await self.clk(pull_data=low)
         return self.edges[-1][1] if len(self.edges) == 11 else None
 
@@ -169,7 +171,7 @@ async def a_command_that_the_host_cuts_short_leaves_nothing(dut):
 
 
 @cocotb.test()
-async def a_command_goes_before_a_byte_and_waits_while_another_stands(dut):
+async def a_command_goes_before_a_byte_and_waits_while_another_waits(dut):
     side = await Side(dut).begin()
     assert await side.command(frame(0xED)[1:]) == 0
     side.commands.clear()
@@ -180,7 +182,7 @@ async def a_command_goes_before_a_byte_and_waits_while_another_stands(dut):
     await side.clk(pull_clock=1, n=round(120 * US))
     while not side.model.valid:  # a byte that is not taken
         await side.clk(
-            pull_data=int(not (side.model.state == "receive" and side.model.place >= 9)), ready=0
+            pull_data=int(not (side.model.state == "receive" and side.model.bit >= 9)), ready=0
         )
     side.edges.clear()
     await side.clk(pull_data=1, n=round(1000 * US), ready=0)

@@ -40,7 +40,7 @@ TYPED = [
 
 
 class Side:
-    """The design and its model, clk by clk."""
+    """The design and its model, cycle by cycle."""
 
     def __init__(self, dut):
         self.dut, self.model, self.bytes, self.results, self.pulls = (
@@ -70,7 +70,7 @@ class Side:
         return self
 
     async def clk(self, clock=1, data=1, hold=0, ready=1, command=None, damaged=0, rst=0, n=1):
-        """n clk with these inputs; returns the pins of the last."""
+        """Run n cycles with these inputs; returns the pins of the last one."""
         d = self.dut
         d.clock.value, d.data.value, d.hold.value, d.received_ready.value, d.rst.value = (
             clock,
@@ -109,12 +109,12 @@ class Side:
         await self.clk(n=BIT, **more)
 
     async def obey(self, acknowledge=0):
-        """Clock a command in as a keyboard does; the bits read."""
+        """Clock a command in as a keyboard does; returns the bits."""
         bits = []
-        for place in range(11):
-            data = acknowledge if place == 10 else 1 - self.pulls[-1][1]
+        for bit in range(11):
+            data = acknowledge if bit == 10 else 1 - self.pulls[-1][1]
             await self.clk(data=data, n=BIT // 2, clock=0)
-            await self.clk(data=data if place == 10 else 1 - self.pulls[-1][1], n=BIT // 2)
+            await self.clk(data=data if bit == 10 else 1 - self.pulls[-1][1], n=BIT // 2)
             bits.append(1 - self.pulls[-1][1])
         return bits
 
@@ -127,7 +127,7 @@ async def one_byte_by_hand(dut):
 
 
 @cocotb.test()
-async def every_byte_passes_and_wrong_parity_is_told(dut):
+async def every_byte_passes_and_wrong_parity_is_reported(dut):
     side = await Side(dut).begin()
     for byte in [0x00, 0xFF, *random.sample(range(256), 40)]:
         await side.clk(n=round(120 * US))
@@ -171,7 +171,7 @@ async def a_command_by_hand(dut):
     while not (await side.clk(command=0xED))[0]:
         pass
     await side.clk(n=round(40 * US))
-    assert side.pulls[-1] == (0, 1)  # data low, clock let go
+    assert side.pulls[-1] == (0, 1)  # data low, clock released
     assert await side.obey() == [
         1,
         0,
@@ -239,8 +239,8 @@ async def reset_lets_go_of_both_lines(dut):
 
 @cocotb.test(skip=not RECORDING.exists())
 async def a_recorded_keyboard_is_read(dut):
-    """The keys a s d f g h of a real keyboard; its pauses are cut to 1 ms, its host's own pulling
-    after each byte stays in.
+    """The keys a s d f g h of a real keyboard; its pauses are shortened to 1 ms, and the pull of
+    its host after each byte is part of the recording.
     """
     side = await Side(dut).begin()
     with open(RECORDING, newline="") as lines:

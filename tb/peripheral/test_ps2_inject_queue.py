@@ -16,8 +16,8 @@ CUT = [(0x14, 0), (0x1D, 0), (0xF0, 0), (0x1D, 0), (0xF0, 0), (0x14, 1)]
 
 
 class Queue:
-    """With a reader: `begins` lets it begin a sequence that stands, `reads` take a code of the one
-    that is under way.
+    """The queue with a reader. `begins` lets the reader begin a waiting sequence, `reads` take a
+    code of the sequence that has begun.
     """
 
     def __init__(self, dut):
@@ -30,7 +30,7 @@ class Queue:
         self.input = getattr(dut, "in")  # a keyword of Python
 
     async def clk(self, push=None, drop=0, begins=0, reads=0, rst=0):
-        """Returns (valid, free) of this clk."""
+        """Returns (valid, free) of this cycle."""
         dut = self.dut
         dut.push.value, dut.drop.value, dut.rst.value, dut.injecting.value = (
             push is not None,
@@ -129,7 +129,7 @@ async def what_comes_after_a_drop_stays(dut):
     queue = await begin(dut)
     await queue.put(CUT * 3)
     await queue.clk(begins=1)
-    await queue.clk(later[0], drop=1)  # even in its clk
+    await queue.clk(later[0], drop=1)  # even in its cycle
     await queue.clk(later[1])
     assert await queue.read_all() == CUT + later
     await queue.put(CUT * 2)

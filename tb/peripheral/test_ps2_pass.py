@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ps2_pass between a keyboard and a host that break every rule they may: typing, cuts, commands,
-damage, injections; equal to the model.
+"""ps2_pass between a keyboard and a host with every disturbance that the interface permits: typing,
+cuts, commands, damage, injections. It equals the model.
 """
 
 import csv
@@ -112,14 +112,18 @@ class Wires:
         assert not until, "waited 4 s for nothing"
 
 
-def without(heard, sequence):
-    """What is left when the one place of the sequence is cut out; None if it is not in one piece
-    there.
+def without(received, sequence):
+    """What is left when the only occurrence of the sequence is cut out; None if it is not in one
+    piece there.
     """
-    places = [
-        n for n in range(len(heard) - len(sequence) + 1) if heard[n : n + len(sequence)] == sequence
+    positions = [
+        n
+        for n in range(len(received) - len(sequence) + 1)
+        if received[n : n + len(sequence)] == sequence
     ]
-    return heard[: places[0]] + heard[places[0] + len(sequence) :] if places else None
+    return (
+        received[: positions[0]] + received[positions[0] + len(sequence) :] if positions else None
+    )
 
 
 @cocotb.test()
@@ -149,7 +153,7 @@ async def latency_is_at_most_200_us_and_what_is_typed_arrives_unchanged(dut):
         await wires.run(6 * MS)
         delay = (wires.edges["host"][10] - wires.edges["keyboard"][10]) / wires.host.us - 10 * 80
         assert 0 < delay <= 200, delay
-    assert wires.host.heard == keys and wires.host.damaged == 0 and wires.typed == len(keys)
+    assert wires.host.received == keys and wires.host.damaged == 0 and wires.typed == len(keys)
 
 
 @cocotb.test()
@@ -157,12 +161,12 @@ async def commands_reach_the_keyboard_and_their_answers_the_host(dut):
     wires = await Wires(dut).begin()
     orders = [0xED, 0x02, 0xF3, 0x20, 0xEE, 0xF2, 0xFF]
     for order in orders:
-        answered = len(wires.host.heard)
+        answered = len(wires.host.received)
         wires.host.orders = [order]
-        await wires.run(until=lambda answered=answered: len(wires.host.heard) > answered)
+        await wires.run(until=lambda answered=answered: len(wires.host.received) > answered)
         await wires.run(12 * MS)
     assert wires.keyboard.commands == orders and wires.host.unanswered == 0 and wires.typed == 0
-    assert wires.host.heard == [0xFA] * 4 + [0xEE] + [0xFA, 0xAB, 0x83] + [0xFA, 0xAA]
+    assert wires.host.received == [0xFA] * 4 + [0xEE] + [0xFA, 0xAB, 0x83] + [0xFA, 0xAA]
 
 
 @cocotb.test()
@@ -171,11 +175,11 @@ async def the_start_of_a_cut_enters_in_one_piece_while_a_person_types(dut):
     keys = [0x1C, 0xF0, 0x1C] * 3
     wires.keyboard.outbox = keys[:4]
     wires.inject = list(START)
-    await wires.run(until=lambda: len(wires.inject) < 5)  # the person goes on while it is under way
+    await wires.run(until=lambda: len(wires.inject) < 5)  # the person types on during the injection
     wires.keyboard.outbox += keys[4:]
-    await wires.run(until=lambda: len(wires.host.heard) == len(keys) + len(START))
+    await wires.run(until=lambda: len(wires.host.received) == len(keys) + len(START))
     await wires.run(10 * MS)
-    assert without(wires.host.heard, START) == keys and wires.host.damaged == 0
+    assert without(wires.host.received, START) == keys and wires.host.damaged == 0
 
 
 @cocotb.test()
@@ -189,12 +193,14 @@ async def a_host_that_cuts_and_orders_at_will_loses_nothing(dut):
         await wires.run(random.randrange(12 * MS))
         order = random.choice([0xED, 0xF3, 0xF4])
         wires.host.orders, orders = [order], [*orders, order]
-        await wires.run(until=lambda turn=turn: wires.host.heard.count(0xFA) > turn)
+        await wires.run(until=lambda turn=turn: wires.host.received.count(0xFA) > turn)
         await wires.run(30 * MS)
     await wires.run(until=lambda: not wires.inject and not wires.keyboard.outbox)
     await wires.run(20 * MS)
-    heard = [byte for byte in wires.host.heard if byte != 0xFA]  # the answers come where they come
-    assert without(heard, START) == keys and wires.keyboard.commands == orders
+    received = [
+        byte for byte in wires.host.received if byte != 0xFA
+    ]  # the answers may come between the keys
+    assert without(received, START) == keys and wires.keyboard.commands == orders
 
 
 @cocotb.test()
@@ -202,11 +208,11 @@ async def damaged_bytes_are_asked_for_again_by_their_receiver(dut):
     wires = await Wires(dut, Keyboard(CLK_HZ, damage=0.3)).begin()
     keys = [0x1C, 0x1B, 0x23, 0x2B, 0x34]
     for key in keys:
-        heard = len(wires.host.heard)
+        received = len(wires.host.received)
         wires.keyboard.outbox = [key]
-        await wires.run(until=lambda heard=heard: len(wires.host.heard) > heard)
+        await wires.run(until=lambda received=received: len(wires.host.received) > received)
         await wires.run(3 * MS)
-    assert wires.host.heard == keys and wires.host.damaged > 0
+    assert wires.host.received == keys and wires.host.damaged > 0
 
 
 @cocotb.test()
@@ -228,7 +234,7 @@ async def reset_in_mid_frame_lets_go_of_all_lines(dut):
 
 
 class Recording(Party):
-    """The lines of a real keyboard and its real host; pauses are cut to 5 ms."""
+    """The recorded lines of a real keyboard and its host; pauses are shortened to 5 ms."""
 
     def live(self):
         with open(RECORDING, newline="") as lines:
@@ -249,12 +255,12 @@ async def a_recorded_keyboard_passes_and_sigrok_reads_it_with_the_injection_afte
     """sigrok takes the clock of a pulling host for the twelfth bit of a byte: this host pulls once
     after each, as the recorded one.
     """
-    wires = await Wires(dut, keyboard=Recording(CLK_HZ), host=Host(CLK_HZ, rest=150)).begin()
-    await wires.run(until=lambda: len(wires.host.heard) == len(TYPED))
+    wires = await Wires(dut, keyboard=Recording(CLK_HZ), host=Host(CLK_HZ, pause=150)).begin()
+    await wires.run(until=lambda: len(wires.host.received) == len(TYPED))
     wires.inject = list(START)
-    await wires.run(until=lambda: len(wires.host.heard) == len(TYPED) + len(START))
+    await wires.run(until=lambda: len(wires.host.received) == len(TYPED) + len(START))
     await wires.run(2 * MS)
-    assert wires.host.heard == TYPED + START
+    assert wires.host.received == TYPED + START
     Path("pass.bin").write_bytes(wires.samples)
     out = subprocess.run(
         [

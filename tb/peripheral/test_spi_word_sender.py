@@ -13,13 +13,13 @@ from tb.peripheral.spi_word_sender import SpiWordSender
 
 
 class Wires:
-    """The design and its model; and what a display driver on the wires takes."""
+    """The design and its model, and the words that a display driver on the wires takes."""
 
     def __init__(self, dut):
         self.dut, self.model, self.half_period = dut, SpiWordSender(), 1
         self.bits, self.taken, self.last, self.now = [], [], (1, 0), 0
         self.fell = self.rose = self.risen = (
-            None  # clk of the last edges of cs_n, of sclk's last rise
+            None  # cycles of the last edges of cs_n and of the last rise of sclk
         )
 
     async def begin(self):

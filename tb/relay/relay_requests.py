@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/relay/relay_requests.sv does, in integers: clk(...) is one clk, the state is what stands
-after it. zlib makes the CRC-32.
+"""Integer model of rtl/relay/relay_requests.sv: clk(...) is one cycle, and the attributes are the
+state after it. zlib computes the CRC-32.
 """
 
 import zlib
@@ -16,8 +16,8 @@ class RelayRequests:
         self.reset()
 
     def reset(self):
-        self.state, self.taken, self.heard = (
-            "listen",
+        self.state, self.taken, self.has_sequence = (
+            "receive",
             None,
             False,
         )  # taken: bytes after the command byte
@@ -26,11 +26,11 @@ class RelayRequests:
 
     @property
     def answer_valid(self):
-        return self.state == "speak"
+        return self.state == "send"
 
     @property
     def answer(self):
-        """The byte at the output; the CRC-32 is that of what went out."""
+        """The byte at the output; the CRC-32 covers the bytes that were sent."""
         if self.at < len(self.row):
             return self.row[self.at]
         return zlib.crc32(bytes(self.row)) >> 8 * (self.at - len(self.row)) & 0xFF
@@ -59,7 +59,7 @@ class RelayRequests:
             return
         flags, self.flags = self.flags, self.flags | events
         self.set_start = self.set_valid = self.pass_valid = False
-        if self.state == "listen":
+        if self.state == "receive":
             if valid and command:
                 self.taken = b""
             elif valid and self.taken is not None:
@@ -76,7 +76,7 @@ class RelayRequests:
                 self.body[self.at] = pass_data
                 self.done()
         elif self.state == "fetch":
-            self.state, self.pass_select = "speak", False
+            self.state, self.pass_select = "send", False
         elif answer_ready:
             if self.at == 0 and self.kind != FLASH:
                 words = (identity, position, correction)
@@ -87,7 +87,7 @@ class RelayRequests:
                     *(word >> n & 0xFF for word in words for n in (0, 8, 16, 24)),
                 )
             self.at += 1
-            self.state = "fetch" if self.at < len(self.row) + 4 else "listen"
+            self.state = "fetch" if self.at < len(self.row) + 4 else "receive"
 
     def act(self, flags, events, pass_ready):
         byte, at = self.body[self.at], self.at
@@ -96,7 +96,7 @@ class RelayRequests:
                 self.set_data, self.pass_valid, self.state = byte, True, "wait"
             return
         if at == 0:
-            self.again, self.heard = self.heard and byte == self.sequence, True
+            self.again, self.has_sequence = self.has_sequence and byte == self.sequence, True
             self.sequence = byte
         elif at == 1:
             self.kind = byte
@@ -110,12 +110,12 @@ class RelayRequests:
         self.done()
 
     def done(self):
-        """With this byte of the body."""
+        """This byte of the body is done."""
         self.at += 1
         if self.at < len(self.body):
             self.state = "read"
         elif len(self.body) == 1 or self.kind > FLASH:
-            self.state = "listen"
+            self.state = "receive"
         else:
             self.state, self.at = "fetch", 0
             self.row = (

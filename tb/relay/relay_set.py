@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/relay/relay_set.sv does: clk(...) is one clk, the state is what stands after it. It asks
-zlib at the end of a row.
-
-image(...) makes the bytes of a set."""
+"""Model of rtl/relay/relay_set.sv: clk(...) is one cycle, and the attributes are the state after
+it. zlib computes the CRC-32 at the end of a row. image(...) makes the bytes of a set.
+"""
 
 import math
 import zlib
@@ -25,8 +24,8 @@ def image(
     gate=0,
     segments=0,
 ):
-    """Bytes of a set; terms are the words (amplitude, phase) of each order from 1 up, or two points
-    each.
+    """The bytes of a set; terms are the words (amplitude, phase) of each order from 1 up, or two
+    points each.
     """
     angle = round(2**48 / counts_per_turn) if counts_per_turn else 0
     radians = round(2 * math.pi * 2**40 / counts_per_turn) % 2**32 if counts_per_turn else 0
@@ -47,7 +46,7 @@ def image(
 class RelaySet:
     def __init__(self, k=16, segments=0):
         self.k, self.segments = k, segments
-        self.row = self.judged = None  # bytes so far; a whole row of the clk before
+        self.row = self.judged = None  # bytes so far; the complete row of the cycle before
         self.settings, self.identity = 0, 0
         self.loaded = self.good = self.bad = False
         self.write = None  # (term, amplitude, phase)
@@ -81,7 +80,7 @@ class RelaySet:
             self.row = b""
 
     def sensible(self, row):
-        """What the CRC-32 does not tell."""
+        """The checks beyond the CRC-32."""
         words = [int.from_bytes(row[n : n + 4], "little") for n in range(0, len(row), 4)]
         sizes = [~word % 2**32 if word >> 31 else word for word in words[1 + SETTINGS : -1]]
         held = max(sizes) < 2**23 if self.segments else sum(sizes[::2]) < 2**29

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/relay/relay_set_source.sv does, in integers."""
+"""Integer model of rtl/relay/relay_set_source.sv."""
 
 
 def source(reading, stored, sent):
-    """(start, valid, data) out of those of the flash and those of the host."""
+    """(start, valid, data), selected from the flash and the host."""
     return stored if reading else sent

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/relay/relay_status.sv does, in integers."""
+"""Integer model of rtl/relay/relay_status.sv."""
 
 ILLEGAL, REVOLUTION_WRONG, MISSING, REJECTED, BEHIND, SET_REFUSED = (1 << n for n in range(6))
 KNOWN, LOADED, CORRECTING, READING = (1 << n for n in range(4))

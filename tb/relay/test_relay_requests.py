@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay_requests: each request by hand, the same one again, what is broken or comes too early, and
-any strobes against the model.
+"""relay_requests: each request by hand, repetitions, damaged and early requests, and random strobes
+against the model.
 """
 
 import random
@@ -34,13 +34,13 @@ IDLE = dict.fromkeys(INPUTS, 0)
 
 
 class Requests:
-    """The design with the model beside it in every clk, frames before it, a chip and a slow line
-    behind it.
+    """The design, compared with the model in every cycle; its inputs are frames, its outputs a chip
+    and a slow bus.
     """
 
     def __init__(self, dut):
         self.dut, self.model, self.last = dut, RelayRequests(), {}
-        self.said, self.set, self.chip, self.answers, self.waits = (
+        self.sent, self.set, self.chip, self.answers, self.waits = (
             bytearray(),
             [],
             bytearray(),
@@ -72,7 +72,7 @@ class Requests:
                 getattr(dut, name).value = level
         self.last = values
         if model.answer_valid and values["answer_ready"]:
-            self.said.append(int(dut.answer.value))
+            self.sent.append(int(dut.answer.value))
         model.clk(**values)
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
@@ -96,7 +96,7 @@ class Requests:
         if model.pass_valid:
             self.waits = 2
 
-    async def hear(self, words, gaps=0, **levels):
+    async def send(self, words, gaps=0, **levels):
         check = FrameCheck()
         for word in words:
             passed, data, command, good, *_ = check.step(1, *word, 0)
@@ -104,29 +104,29 @@ class Requests:
             for _ in range(gaps):
                 await self.clk(data=random.getrandbits(8), **levels)
 
-    async def ask(self, *body, **levels):
-        """The body of the answer; None if there is none."""
-        self.said = bytearray()
-        await self.hear(frame(0x21, body), **levels)
+    async def request(self, *body, **levels):
+        """Send a request; returns the body of the answer, or None if there is no answer."""
+        self.sent = bytearray()
+        await self.send(frame(0x21, body), **levels)
         for _ in range(4):
             await self.clk(**levels)
         clks = 0
-        while self.model.state != "listen":
+        while self.model.state != "receive":
             await self.clk(**levels)
             clks += 1
             assert clks < 4000
-        if not self.said:
+        if not self.sent:
             return None
-        words = frame(0x61, self.said[2:-4])
-        assert [byte for byte, _ in words] == list(self.said)
-        return bytes(self.said[2:-4])
+        words = frame(0x61, self.sent[2:-4])
+        assert [byte for byte, _ in words] == list(self.sent)
+        return bytes(self.sent[2:-4])
 
 
 @cocotb.test()
 async def status_by_hand(dut):
     host = await Requests(dut).reset()
     await host.clk(events=0x05)
-    told = await host.ask(
+    answer = await host.request(
         9,
         STATUS,
         levels=0x0B,
@@ -136,7 +136,7 @@ async def status_by_hand(dut):
         position=0x55667788,
         correction=-2 & 0xFFFFFFFF,
     )
-    assert told == bytes(
+    assert answer == bytes(
         [9, 0, 5, 0x0B, 130, 0x44, 0x33, 0x22, 0x11, 0x88, 0x77, 0x66, 0x55, 0xFE, 0xFF, 0xFF, 0xFF]
     )
 
@@ -145,13 +145,13 @@ async def status_by_hand(dut):
 async def latency_is_2_for_each_byte_and_3_more_to_the_answer(dut):
     host = await Requests(dut).reset()
     for length in (2, 3, 10):
-        await host.hear(frame(0x21, [length, STATUS, *[0] * (length - 2)]), answer_ready=0)
+        await host.send(frame(0x21, [length, STATUS, *[0] * (length - 2)]), answer_ready=0)
         clks = 0
         while not dut.answer_valid.value:
             await host.clk(answer_ready=0)
             clks += 1
         assert clks == 2 * length + 1
-        while host.model.state != "listen":
+        while host.model.state != "receive":
             await host.clk()
 
 
@@ -159,54 +159,54 @@ async def latency_is_2_for_each_byte_and_3_more_to_the_answer(dut):
 async def flags_fall_that_are_named_and_no_others(dut):
     host = await Requests(dut).reset()
     await host.clk(events=0xFF)
-    assert (await host.ask(1, CLEAR, 0x0F))[2] == 0xF0
-    assert (await host.ask(2, CLEAR, 0xC0, events=0x40))[2] == 0x70
-    assert (await host.ask(3, CLEAR))[2] == 0x70
+    assert (await host.request(1, CLEAR, 0x0F))[2] == 0xF0
+    assert (await host.request(2, CLEAR, 0xC0, events=0x40))[2] == 0x70
+    assert (await host.request(3, CLEAR))[2] == 0x70
 
 
 @cocotb.test()
 async def a_set_passes_byte_by_byte(dut):
     host = await Requests(dut).reset()
-    assert (await host.ask(1, BEGIN_SET, 10, 20, 30))[:2] == bytes([1, BEGIN_SET])
-    assert await host.ask(2, SET, 40) and host.set == ["start", 10, 20, 30, 40]
+    assert (await host.request(1, BEGIN_SET, 10, 20, 30))[:2] == bytes([1, BEGIN_SET])
+    assert await host.request(2, SET, 40) and host.set == ["start", 10, 20, 30, 40]
 
 
 @cocotb.test()
 async def a_repeated_request_is_answered_and_not_acted_on(dut):
     host = await Requests(dut).reset()
     for _ in range(3):
-        assert (await host.ask(0, BEGIN_SET, 1, 2))[:2] == bytes([0, BEGIN_SET])
+        assert (await host.request(0, BEGIN_SET, 1, 2))[:2] == bytes([0, BEGIN_SET])
     for _ in range(3):
-        assert (await host.ask(1, SET, 3))[:2] == bytes([1, SET])
+        assert (await host.request(1, SET, 3))[:2] == bytes([1, SET])
     assert host.set == ["start", 1, 2, 3]
     await host.clk(events=0x03)
-    assert (await host.ask(2, CLEAR, 0x01))[2] == 0x02
+    assert (await host.request(2, CLEAR, 0x01))[2] == 0x02
     await host.clk(events=0x01)
-    assert (await host.ask(2, CLEAR, 0x01))[2] == 0x03
-    assert (await host.ask(3, CLEAR, 0x01))[2] == 0x02
+    assert (await host.request(2, CLEAR, 0x01))[2] == 0x03
+    assert (await host.request(3, CLEAR, 0x01))[2] == 0x02
 
 
 @cocotb.test()
 async def the_first_request_after_reset_repeats_nothing(dut):
     for _ in range(2):
         host = await Requests(dut).reset()
-        assert await host.ask(7, BEGIN_SET, 5) and host.set == ["start", 5]
+        assert await host.request(7, BEGIN_SET, 5) and host.set == ["start", 5]
 
 
 @cocotb.test()
 async def flash_bytes_go_out_and_back_and_wait_until_the_chip_is_free(dut):
     host = await Requests(dut).reset()
-    assert await host.ask(5, FLASH, 0x9F, 0, 1) == bytes([5, FLASH, 0x60, 0xFF, 0xFE])
+    assert await host.request(5, FLASH, 0x9F, 0, 1) == bytes([5, FLASH, 0x60, 0xFF, 0xFE])
     assert bytes(host.chip) == bytes([0x9F, 0, 1])
-    await host.hear(frame(0x21, [6, FLASH, 3]))
+    await host.send(frame(0x21, [6, FLASH, 3]))
     for _ in range(50):
         await host.clk(pass_ready=0)
     assert len(host.chip) == 3 and host.model.pass_select
-    while host.model.state != "listen":
+    while host.model.state != "receive":
         await host.clk()
     assert host.chip[3:] == b"\x03"
     longest = bytes(range(62))
-    assert await host.ask(8, FLASH, *longest) == bytes([8, FLASH]) + bytes(
+    assert await host.request(8, FLASH, *longest) == bytes([8, FLASH]) + bytes(
         byte ^ 0xFF for byte in longest
     )
 
@@ -215,18 +215,18 @@ async def flash_bytes_go_out_and_back_and_wait_until_the_chip_is_free(dut):
 async def neither_unknown_kinds_nor_empty_requests_have_an_answer(dut):
     host = await Requests(dut).reset()
     for body in ([1, 5], [2, 255, 1, 2], [3]):
-        assert await host.ask(*body) is None
-    assert await host.ask(4, STATUS) and not host.set and not host.chip
+        assert await host.request(*body) is None
+    assert await host.request(4, STATUS) and not host.set and not host.chip
 
 
 @cocotb.test()
 async def a_frame_that_begins_before_the_answer_is_out_is_dropped_whole(dut):
     host = await Requests(dut).reset()
     for early in range(1, 9):
-        await host.hear(frame(0x21, [early, STATUS]))
+        await host.send(frame(0x21, [early, STATUS]))
         words = frame(0x21, [100 + early, BEGIN_SET, 1])
-        await host.hear(words[:early])
-        while host.model.state != "listen":
+        await host.send(words[:early])
+        while host.model.state != "receive":
             await host.clk(answer_ready=1)
         check = FrameCheck()
         passed = [check.step(1, *word, 0) for word in words]
@@ -234,20 +234,20 @@ async def a_frame_that_begins_before_the_answer_is_out_is_dropped_whole(dut):
             await host.clk(valid=1, data=data, command=command, good=good)
         for _ in range(20):
             await host.clk()
-    assert not host.set and await host.ask(50, STATUS)
+    assert not host.set and await host.request(50, STATUS)
 
 
 @cocotb.test()
 async def a_broken_frame_moves_nothing(dut):
     host = await Requests(dut).reset()
-    whole = frame(0x21, [1, BEGIN_SET, 1, 2])
-    for n in range(1, len(whole)):
-        broken = list(whole)
+    complete = frame(0x21, [1, BEGIN_SET, 1, 2])
+    for n in range(1, len(complete)):
+        broken = list(complete)
         broken[n] = broken[n][0] ^ 1 << random.randrange(8), 0
-        await host.hear(broken)
+        await host.send(broken)
         for _ in range(20):
             await host.clk()
-    assert not host.set and not host.said
+    assert not host.set and not host.sent
 
 
 @cocotb.test()
@@ -255,13 +255,13 @@ async def reset_in_mid_flow(dut):
     host = await Requests(dut).reset()
     for wait in range(0, 60, 3):
         await host.clk(events=1)
-        await host.hear(frame(0x21, [1, random.choice((STATUS, BEGIN_SET, FLASH)), 2, 3]))
+        await host.send(frame(0x21, [1, random.choice((STATUS, BEGIN_SET, FLASH)), 2, 3]))
         for _ in range(wait):
             await host.clk()
         host.waits = None
         await host.clk(rst=1)
         assert host.model.flags == 0 and not dut.answer_valid.value
-        assert (await host.ask(1, STATUS))[2] == 0
+        assert (await host.request(1, STATUS))[2] == 0
 
 
 @cocotb.test()
@@ -284,7 +284,7 @@ async def any_strobes_match_the_model(dut):
             correction=random.getrandbits(32),
         )
         words = frame(random.choice((0x21, 0x21, 0x11)), body)
-        await host.hear(
+        await host.send(
             words[: random.choice((len(words), len(words), random.randrange(1, len(words))))],
             random.randrange(2),
             **levels,

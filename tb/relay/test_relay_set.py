@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay_set: a whole set by hand, every broken bit refused, and rows cut anywhere against the model
-in every cycle.
+"""relay_set: a complete set by hand, each wrong bit is refused, and rows that end anywhere are
+compared with the model in every cycle.
 """
 
 import random
@@ -28,7 +28,7 @@ WIDTHS = 32, 48, 16, 32, 16, 8, 2, 2, 1
 
 
 class Bytes:
-    """The design with the model beside it in every cycle."""
+    """The design, compared with the model in every cycle."""
 
     def __init__(self, dut):
         self.dut, self.k = dut, int(dut.K.value)
@@ -70,13 +70,13 @@ class Bytes:
             got = tuple(int(x.value) for x in (dut.term, dut.amplitude, dut.phase))
             assert got == model.write
             self.written.append(got)
-        packed, place = 0, 0
+        packed, offset = 0, 0
         for name, width in zip(SETTINGS, WIDTHS):
-            packed, place = packed | int(getattr(dut, name).value) << place, place + width
+            packed, offset = packed | int(getattr(dut, name).value) << offset, offset + width
         assert packed == model.settings % 2**157
 
     async def send(self, row, gaps=False):
-        """Returns +1 if it was good, -1 if bad, 0 if neither."""
+        """Returns +1 if the set was good, -1 if it was bad, otherwise 0."""
         await self.clk(start=1)
         verdict = 0
         for byte in [*row, None, None, None]:
@@ -103,7 +103,7 @@ def any_terms(row):
 async def by_hand(dut):
     row = await Bytes(dut).reset()
     terms = any_terms(row)
-    whole = image(
+    good_set = image(
         terms,
         1 << 15,
         minimum_edge_separation=3,
@@ -114,7 +114,7 @@ async def by_hand(dut):
         gate=2,
         segments=row.segments,
     )
-    assert await row.send(whole) == 1
+    assert await row.send(good_set) == 1
     assert row.written == [(n, a, p) for n, (a, p) in enumerate(terms)]
     assert (
         int(dut.counts_per_turn.value) == 32768
@@ -147,13 +147,13 @@ async def latency_is_2(dut):
 @cocotb.test()
 async def no_broken_bit_comes_into_force(dut):
     row = await Bytes(dut).reset()
-    whole = image(any_terms(row), 32768, segments=row.segments)
-    assert await row.send(whole) == 1
+    good_set = image(any_terms(row), 32768, segments=row.segments)
+    assert await row.send(good_set) == 1
     for _ in range(24):
         broken = bytearray(image(any_terms(row), 4000, segments=row.segments))
         for _ in range(random.choice((1, 1, 2, 3))):
             broken[random.randrange(len(broken))] ^= 1 << random.randrange(8)
-        assert await row.send(broken, gaps=True) == -1 or bytes(broken) == whole
+        assert await row.send(broken, gaps=True) == -1 or bytes(broken) == good_set
     assert int(dut.counts_per_turn.value) == 32768
 
 
@@ -184,8 +184,8 @@ async def amplitudes_that_may_overflow_the_map_are_refused(dut):
     row = await Bytes(dut).reset()
     needs(not row.segments, "a table has no amplitudes")
     for sign in (1, -1):
-        share, rest = divmod(2**29 - 1, row.k)
-        sizes = [share] * (row.k - 1) + [share + rest]
+        share, remainder = divmod(2**29 - 1, row.k)
+        sizes = [share] * (row.k - 1) + [share + remainder]
         words = [size if sign > 0 else ~size % 2**32 for size in sizes]
         assert await row.send(image([(word, 0) for word in words], 32768)) == 1
         for n in {0, row.k - 1}:
@@ -208,9 +208,9 @@ async def points_of_128_counts_are_refused(dut):
         (2**31 - 1, -1),
         (-(2**31), -1),
     ):
-        for place in (0, 2 * row.k - 1):
+        for index in (0, 2 * row.k - 1):
             words = [0] * (2 * row.k)
-            words[place] = value
+            words[index] = value
             assert (
                 await row.send(
                     image(list(zip(words[::2], words[1::2])), 32768, segments=row.segments)
@@ -231,21 +231,21 @@ async def a_set_of_harmonics_for_segments_and_the_other_way_round_is_refused(dut
 async def a_row_cut_short_changes_nothing_and_the_next_is_whole(dut):
     row = await Bytes(dut).reset()
     for _ in range(20):
-        whole = image(any_terms(row), random.getrandbits(25) | 4096, segments=row.segments)
-        assert await row.send(whole[: random.randrange(len(whole))]) == 0
-        assert await row.send(whole) == 1
+        good_set = image(any_terms(row), random.getrandbits(25) | 4096, segments=row.segments)
+        assert await row.send(good_set[: random.randrange(len(good_set))]) == 0
+        assert await row.send(good_set) == 1
         assert await row.send(b"") == 0
 
 
 @cocotb.test()
 async def reset_in_mid_flow(dut):
     row = await Bytes(dut).reset()
-    whole = image(any_terms(row), 7777, segments=row.segments)
+    good_set = image(any_terms(row), 7777, segments=row.segments)
     for _ in range(10):
-        await row.send(whole)
-        await row.send(whole[: random.randrange(len(whole))])
+        await row.send(good_set)
+        await row.send(good_set[: random.randrange(len(good_set))])
         await row.clk(rst=1)
-        for byte in whole:
+        for byte in good_set:
             await row.clk(valid=1, data=byte)  # without a start nothing is taken
         assert not row.model.loaded and int(dut.counts_per_turn.value) == 0
 

@@ -15,8 +15,8 @@ LENGTH, FIRST, SECOND = 20, 4096, 8192
 
 
 class Store:
-    """The design with a chip on its pins, two clk away as behind a synchroniser, and a set that
-    says good or bad.
+    """The design with a chip on its pins, two cycles late as behind a synchroniser, and a set that
+    reports good or bad.
     """
 
     def __init__(self, dut, first, second):
@@ -62,8 +62,8 @@ class Store:
         if dut.pass_done.value:
             self.passed.append(int(dut.data.value))
 
-    async def whole(self):
-        """Clk until it is done."""
+    async def done(self):
+        """Run until the store is done; returns the cycles."""
         clks = 0
         while clks == 0 or self.dut.busy.value:
             await self.clk()
@@ -72,7 +72,7 @@ class Store:
         return clks
 
     async def send(self, row):
-        """The bytes that come back."""
+        """Send bytes to the chip; returns its answer."""
         self.passed = []
         await self.clk(pass_select=1)
         for n, byte in enumerate(row):
@@ -97,7 +97,7 @@ async def the_first_whole_copy_is_taken(dut):
     for marks, source in (((1, 1), 1), ((0, 1), 2), ((1, 0), 1), ((0, 0), 0)):
         copies = [some(mark) for mark in marks]
         store = await Store(dut, *copies).reset()
-        await store.whole()
+        await store.done()
         assert int(dut.source.value) == source
         assert store.copies == (copies[:1] if marks[0] else copies)
 
@@ -109,14 +109,14 @@ async def latency_is_2048_and_66_for_each_byte(dut):
     first copy, also the byte that wakes the chip.
     """
     store = await Store(dut, some(0), some(1)).reset()
-    whole = []  # clk from reset, or from the verdict, to the last byte of each copy
+    cycles = []  # cycles from reset, or from the verdict, to the last byte of each copy
     for bytes_before in (5, 4):
         clks = 0
         while not (dut.valid.value and len(store.copies[-1]) == LENGTH):
             await store.clk()
             clks += 1
-        whole.append(clks)
-        assert clks == 2048 + 66 * (LENGTH + bytes_before), whole
+        cycles.append(clks)
+        assert clks == 2048 + 66 * (LENGTH + bytes_before), cycles
         while not (dut.bad.value or dut.good.value):
             await store.clk()
     assert (
@@ -128,7 +128,7 @@ async def latency_is_2048_and_66_for_each_byte(dut):
 @cocotb.test()
 async def bytes_pass_through_both_ways(dut):
     store = await Store(dut, some(1), some(1)).reset()
-    await store.whole()
+    await store.done()
     await store.send(b"\x06")
     await store.send(bytes([0x02, 0x00, 0x30, 0x10]) + b"moire")
     assert store.chip.memory[0x3010:0x3015] == b"moire"
@@ -149,7 +149,7 @@ async def while_it_reads_it_is_not_ready_for_other_bytes(dut):
 
 
 @cocotb.test()
-async def reset_while_it_reads_begins_anew(dut):
+async def reset_while_it_reads_starts_from_the_beginning(dut):
     copy = some(1)
     store = await Store(dut, copy, some(1)).reset()
     for wait in (100, 2300, 2700, 3200):
@@ -157,7 +157,7 @@ async def reset_while_it_reads_begins_anew(dut):
             await store.clk()
         await store.clk(rst=1)
         store.copies = []
-    await store.whole()
+    await store.done()
     assert store.copies == [copy] and int(dut.source.value) == 1
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prepared moves of two nodes begin at one mark: judged by the machines, clk by clk, with nodes
-that did not power up together.
+"""Prepared moves of two nodes begin at one sync. The machines are compared cycle by cycle, and the
+nodes did not power up together.
 """
 
 import random
@@ -30,13 +30,13 @@ SETTINGS = {
     "jerk": "500m/s3",
 }
 MOVE = "200um"
-LONGEST_S = 0.05  # until a table has moved
+LONGEST_S = 0.05  # time until a table has moved
 MOVED_M = 1e-9
 
 
 @pytest.fixture(scope="module")
 def axes():
-    """Of two nodes that stand at zero; the second lost its power for a moment, so its ticks come at
+    """The axes of two nodes at zero. The second lost its power for a moment, so its ticks come at
     other moments.
     """
     with Twin(
@@ -46,11 +46,11 @@ def axes():
         node_parameters=ALL_PERIPHERALS | NODE,
     ) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))
-        twin.run(START_S)
+        twin.run_until_ready()
         twin.power_cut(1)
         twin.run(random.Random(seed()).uniform(0.0101, 0.0102))
         twin.power_on(1)
-        twin.run(START_S)
+        twin.run_until_ready()
         made = [bus.axis(address) for address in ADDRESSES]
         for axis in made:
             for name, value in SETTINGS.items():
@@ -100,12 +100,12 @@ def test_two_tables_on_two_nodes_begin_to_move_within_a_microsecond(prepared):
     assert all(status.position_nm == pytest.approx(200_000, abs=500) for status in reached)
 
 
-def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
+def test_a_node_that_missed_the_sync_is_reported_and_does_not_move(prepared):
     bus, twin = prepared[0].node.bus, prepared[0].transport.twin
     steps = [twin.truth(n).steps for n in range(2)]
 
-    class Deaf:
-        """The second node's cable is off while a mark is sent."""
+    class CableOff:
+        """The second node's cable is off while a sync is sent."""
 
         def __getattr__(self, name):
             return getattr(twin_bus, name)
@@ -117,7 +117,7 @@ def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
             else:
                 twin_bus.send(words)
 
-    twin_bus, bus.transport = bus.transport, Deaf()
+    twin_bus, bus.transport = bus.transport, CableOff()
     with pytest.raises(
         BusError, match="did not receive the sync at which its motion should begin"
     ) as caught:
@@ -126,9 +126,9 @@ def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
     assert caught.value.address == 2
     assert (
         twin.truth(1).steps == steps[1] and twin.truth(0).steps != steps[0]
-    )  # the first had begun, and was stopped
-    heard, missed = (axis.status() for axis in prepared)
-    assert heard.ended == "stopped" and not heard.in_motion and missed.state != "prepared"
+    )  # the first had begun and was stopped
+    started, missed = (axis.status() for axis in prepared)
+    assert started.ended == "stopped" and not started.in_motion and missed.state != "prepared"
     bus.sync()
     twin.run(0.02)
-    assert twin.truth(1).steps == steps[1]  # a later mark does not begin it
+    assert twin.truth(1).steps == steps[1]  # a later sync does not begin it

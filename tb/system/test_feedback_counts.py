@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""feedback_channel with its position from counts of A/B/Z, built with sine and cosine and without:
-exact at an edge in every cycle, at the index, through align, and of the axis' own steps.
+"""feedback_channel with its position from the counts of A/B/Z, built with and without sine and
+cosine. The position is exact with an edge in every cycle, at the index, after align, and when it
+counts the axis' own steps.
 """
 
 import random
@@ -11,39 +12,11 @@ from cocotb.triggers import FallingEdge
 
 from moire.made.registers import FIELDS
 from tb.bench import needs, run, seed, start
+from tb.interpolate.feedback_inputs import INPUTS, SETTINGS
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 QUARTER = 1 << 14
-LATENCY = 5  # clk from the pins to position: filter 1, decoder 2, position 2; table 1
-SETTINGS = dict(
-    deglitch=0,
-    outlier_step=0,
-    outlier_hold=0,
-    amplitude_low=0,
-    amplitude_high=65535,
-    disagreement_limit=0,
-    encoder_fault_mask=0,
-)
-INPUTS = dict(
-    tick=0,
-    sample_tick=0,
-    sync=0,
-    now=0,
-    select=0,
-    write=0,
-    word=0,
-    wdata=0,
-    shift=0,
-    shift_periods=0,
-    a=0,
-    b=0,
-    z=0,
-    probe=0,
-    own_step=0,
-    own_downward=1,
-    adc_sin=1,
-    adc_cos=1,
-)
+LATENCY = 5  # cycles from the pins to position: filter 1, decoder 2, position 2; table 1
 
 
 def latency(dut):
@@ -51,22 +24,22 @@ def latency(dut):
 
 
 def register(name):
-    """(word, {field: its lowest bit}) of a register of the block grating."""
+    """(word, {field: its lowest bit}) of a register of the block feedback."""
     fields = [known for known in FIELDS if known.block == "feedback" and known.register == name]
     return fields[0].address(0) % 256 // 4, {known.field: known.low for known in fields}
 
 
 class Bench:
-    """A scale in front of the design; at reset it stands at `place`, in counts, which the design
-    calls 0.
+    """A scale in front of the design. At reset the scale is at `count`; this is the position 0 of
+    the design.
     """
 
     @classmethod
-    async def begin(cls, dut, place=0, mode=0, steps=0):
+    async def begin(cls, dut, count=0, mode=0, steps=0):
         bench = cls()
-        bench.dut, bench.place, bench.latency = dut, place, latency(dut)
-        await start(dut, **SETTINGS, **{**INPUTS, **dict(zip("ab", TURN[place % 4]))})
-        for _ in range(12):  # filter and decoder only take their levels after reset
+        bench.dut, bench.count, bench.latency = dut, count, latency(dut)
+        await start(dut, **SETTINGS, **{**INPUTS, **dict(zip("ab", TURN[count % 4]))})
+        for _ in range(12):  # after reset, filter and decoder only take over the levels
             await FallingEdge(dut.clk)
         await bench.write("decoder_mode", value=mode)
         await bench.write("position_source", counts=1, steps=steps)
@@ -99,8 +72,8 @@ class Bench:
             await FallingEdge(self.dut.clk)
         self.dut.select.value = self.dut.write.value = 0
 
-    async def rest(self):
-        """Until the segment table has answered for here, and its answer is in force."""
+    async def settle_segments(self):
+        """Wait until the correction of the segment table for this position is in force."""
         for _ in range(3):
             await self.sample()
             for _ in range(32):
@@ -121,20 +94,20 @@ class Bench:
             await FallingEdge(self.dut.clk)
 
     def pins(self, z=0):
-        self.dut.a.value, self.dut.b.value = TURN[self.place % 4]
+        self.dut.a.value, self.dut.b.value = TURN[self.count % 4]
         self.dut.z.value = int(z)
 
     def position(self):
         return self.dut.position.value.to_signed()
 
-    async def go(self, steps, at_index=lambda place: False, clk=1):
-        """Each step takes so many clk; then what is on its way arrives. Returns the positions after
+    async def go(self, steps, at_index=lambda count: False, clk=1):
+        """Each step takes `clk` cycles; then the pipeline empties. Returns the positions after
         each clk.
         """
         positions = []
         for step in steps:
-            self.place += step
-            self.pins(at_index(self.place))
+            self.count += step
+            self.pins(at_index(self.count))
             for _ in range(clk):
                 await FallingEdge(self.dut.clk)
                 positions.append(self.position())
@@ -162,31 +135,31 @@ class Bench:
 async def latency_is_5_and_position_is_exact_at_an_edge_every_cycle(dut):
     bench, source = await Bench.begin(dut), random.Random(seed())
     steps = [1] * 40 + [-1] * 90 + [source.choice((-1, 0, 1)) for _ in range(4000)] + [1, -1] * 50
-    way, place = [], 0
+    expected, count = [], 0
     for step in steps:
-        place += step
-        way.append(place * QUARTER)
+        count += step
+        expected.append(count * QUARTER)
     got = await bench.go(steps)
-    assert got[bench.latency - 1 : bench.latency - 1 + len(way)] == way
+    assert got[bench.latency - 1 : bench.latency - 1 + len(expected)] == expected
     assert (
         bench.position()
-        == place * QUARTER
+        == count * QUARTER
         == bench.dut.quadrature_count.value.to_signed() * QUARTER
     )
 
 
 @cocotb.test()
 async def the_index_is_captured_at_its_count_in_both_directions_at_any_speed(dut):
-    for start_place in range(
+    for first_count in range(
         4
-    ):  # so that the index begins with any edge of A or B, in the same clk
+    ):  # so that the index begins with any edge of A or B, in the same cycle
         for clk in (1, 2, 3, 7):
-            bench = await Bench.begin(dut, start_place)
+            bench = await Bench.begin(dut, first_count)
             await bench.write("index", up=1, down=1, each=1)
             await bench.write("capture_sources", value=1)
             for direction in (1, -1, 1):
-                await bench.go([direction] * 18, lambda place, at=start_place + 9: place == at, clk)
-            assert await bench.captured() == [9 * QUARTER] * 3, (start_place, clk)
+                await bench.go([direction] * 18, lambda count, at=first_count + 9: count == at, clk)
+            assert await bench.captured() == [9 * QUARTER] * 3, (first_count, clk)
 
 
 @cocotb.test()
@@ -195,10 +168,10 @@ async def a_wide_index_is_captured_at_the_same_count_when_gated_by_a_and_b(dut):
         bench = await Bench.begin(dut)
         await bench.write(
             "index", up=1, down=1, each=1, gate_mask=gated, gate=0b01
-        )  # place 9: a = 1, b = 0
+        )  # count 9: a = 1, b = 0
         await bench.write("capture_sources", value=1)
         for direction in (1, -1, 1):
-            await bench.go([direction] * 18, lambda place: 8 <= place <= 10, 2)
+            await bench.go([direction] * 18, lambda count: 8 <= count <= 10, 2)
         assert await bench.captured() == [count * QUARTER for count in want]
 
 
@@ -209,7 +182,7 @@ async def an_armed_index_is_captured_once(dut):
     await bench.write("capture_sources", value=1)
     await bench.write("strobes", arm_index=1)
     for direction in (1, -1, 1):
-        await bench.go([direction] * 18, lambda place: place == 9)
+        await bench.go([direction] * 18, lambda count: count == 9)
     assert await bench.captured() == [9 * QUARTER]
 
 
@@ -218,10 +191,10 @@ async def align_moves_position_by_whole_counts_also_together_with_an_edge(dut):
     for counts in (-2, -1, 1, 2):
         for wait in range(
             latency(dut) + 2
-        ):  # the strobe meets every clk of an edge's way, and none
+        ):  # the strobe comes in each cycle of an edge's latency, and in none
             bench = await Bench.begin(dut)
             await bench.go([1] * 6)
-            bench.place += 1
+            bench.count += 1
             bench.pins()
             for _ in range(wait):
                 await FallingEdge(dut.clk)
@@ -236,7 +209,7 @@ async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut
     for periods in (-(1 << 31), -3, 1, (1 << 31) - 1):
         for wait in range(latency(dut) + 2):
             bench = await Bench.begin(dut)
-            bench.place += 1
+            bench.count += 1
             bench.pins()
             for _ in range(wait):
                 await FallingEdge(dut.clk)
@@ -251,7 +224,7 @@ async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut
 async def own_steps_are_counted_in_their_direction_whatever_the_edge_filter_is_set_to(dut):
     bench = await Bench.begin(dut, mode=3, steps=1)
     dut.deglitch.value = 1000
-    place = 0
+    count = 0
     for direction in (1, 0, 0, 1):
         dut.own_downward.value = 1 - direction
         await FallingEdge(dut.clk)  # set-up
@@ -259,30 +232,32 @@ async def own_steps_are_counted_in_their_direction_whatever_the_edge_filter_is_s
             for level in (1, 0):
                 dut.own_step.value = level
                 await FallingEdge(dut.clk)
-            place += 1 if direction else -1
+            count += 1 if direction else -1
         await bench.go([])
-        assert bench.position() == place * QUARTER
+        assert bench.position() == count * QUARTER
 
 
 PULSE_TOO_SHORT = 5  # of encoder_events
 
 
 async def pulses(dut, pulse, gap, number=20):
-    """Pulses of a so many clk long and apart; how many of the events pulse_too_short they raise."""
-    told = 0
+    """Pulses of A with these lengths and gaps in cycles; returns how many events pulse_too_short
+    they raise.
+    """
+    reported = 0
     for level, clk in [(1, pulse), (0, gap)] * number + [(0, 300)]:
         dut.a.value = level
         for _ in range(clk):
             await FallingEdge(dut.clk)
-            told += int(dut.events.value) >> PULSE_TOO_SHORT & 1
-    return told
+            reported += int(dut.events.value) >> PULSE_TOO_SHORT & 1
+    return reported
 
 
 @cocotb.test()
-async def pulses_and_gaps_too_short_for_the_edge_filter_are_told_each(dut):
+async def pulses_and_gaps_too_short_for_the_edge_filter_are_each_reported(dut):
     bench = await Bench.begin(dut, mode=3)
-    grbl = 244  # clk of 25 MHz: its pulses are high for 9.76 us
-    for needed, pulse, gap, counted, told in (
+    grbl = 244  # cycles of 25 MHz: its pulses are high for 9.76 us
+    for needed, pulse, gap, counted, reported in (
         (10, 10, 10, 20, 0),
         (10, 9, 30, 0, 20),
         (10, 30, 9, 1, 19),
@@ -291,9 +266,9 @@ async def pulses_and_gaps_too_short_for_the_edge_filter_are_told_each(dut):
     ):
         dut.deglitch.value = needed
         before = bench.position()
-        assert await pulses(dut, pulse, gap) == told
+        assert await pulses(dut, pulse, gap) == reported
         await bench.sample()
-        assert abs(bench.position() - before) == counted * QUARTER and counted + told == 20
+        assert abs(bench.position() - before) == counted * QUARTER and counted + reported == 20
 
 
 @cocotb.test()
@@ -308,7 +283,7 @@ async def glitches_of_a_scale_and_of_pins_that_are_not_counted_raise_no_pulse_to
 async def reset_in_mid_flow_drops_the_edge(dut):
     bench = await Bench.begin(dut)
     await bench.go([1] * 6)
-    bench.place += 1
+    bench.count += 1
     bench.pins()
     await FallingEdge(dut.clk)
     dut.rst.value = 1
@@ -340,18 +315,18 @@ async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_
             moved.append(dut.moved_by.value.to_signed())
         await FallingEdge(dut.clk)
     assert moved == [-450] and bench.position() == 12 * QUARTER - 450
-    assert await bench.read("segment_state") == 0x5FF  # known, in force, 255
-    for step in (1, -1):  # sign right in both directions
+    assert await bench.read("segment_state") == 0x5FF  # loaded, in force, 255 segments
+    for step in (1, -1):  # the sign is right in both directions
         for _ in range(12 if step > 0 else 30):
             await bench.go([step])
-            await bench.rest()
-            place = (bench.place - 8) / 8
-            left = max(0, min(2, int(place)))
-            error = errors[left] + (errors[left + 1] - errors[left]) * max(0, min(1, place - left))
-            assert abs(bench.position() - bench.place * QUARTER + error) <= 0.5
-            assert bool(await bench.read("segment_state") & 0x200) == (not 0 <= place < 3)
-    await bench.go([1] * (16 - bench.place))
-    await bench.rest()
+            await bench.settle_segments()
+            border = (bench.count - 8) / 8
+            left = max(0, min(2, int(border)))
+            error = errors[left] + (errors[left + 1] - errors[left]) * max(0, min(1, border - left))
+            assert abs(bench.position() - bench.count * QUARTER + error) <= 0.5
+            assert bool(await bench.read("segment_state") & 0x200) == (not 0 <= border < 3)
+    await bench.go([1] * (16 - bench.count))
+    await bench.settle_segments()
     await bench.write("capture_sources", value=4)
     await bench.wide("compare_start", 16 * QUARTER - 900)
     await bench.wide("compare_step", 4 * QUARTER)
@@ -359,9 +334,9 @@ async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_
     for pulses, step in (
         (0, -1),
         (1, 1),
-    ):  # armed one count below, it fires where the corrected scale says so
+    ):  # armed one count below, it fires at the corrected position
         await bench.go([step])
-        await bench.rest()
+        await bench.settle_segments()
         await bench.write("strobes", capture_now=1, compare_arm=1 - pulses)
         await bench.sample()
         assert await bench.read("compare_passed") == pulses
@@ -377,7 +352,7 @@ async def a_shift_moves_the_segment_table_with_the_scale(dut):
     await bench.wide("segment_length", 40 * QUARTER)
     await bench.write("segment_use", enable=1, linear=1, segments=1)
     await bench.go([1] * 20)
-    await bench.rest()
+    await bench.settle_segments()
     assert bench.position() == 20 * QUARTER - 400
     dut.shift.value, dut.shift_periods.value = 1, -7
     await FallingEdge(dut.clk)
@@ -385,7 +360,7 @@ async def a_shift_moves_the_segment_table_with_the_scale(dut):
     await bench.go([])
     assert bench.position() == -8 * QUARTER - 400
     await bench.go([1] * 10)
-    await bench.rest()
+    await bench.settle_segments()
     assert bench.position() == 2 * QUARTER - 600
 
 
@@ -423,11 +398,11 @@ async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_i
         "strobes", load_correction=1, swap_harmonics=1, record=1, clear_signal_faults=1
     )
     dut.amplitude_low.value, dut.outlier_step.value, dut.disagreement_limit.value = 65535, 1, 1
-    place = 0
+    count = 0
     for _ in range(2000):
         step = source.choice((-1, 0, 1))
-        place += step
-        bench.place += step
+        count += step
+        bench.count += step
         bench.pins()
         for pin in (dut.sample_tick, dut.adc_sin, dut.adc_cos):
             pin.value = source.getrandbits(1)
@@ -444,7 +419,7 @@ async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_i
         ):
             assert int(idle.value) == 0
     await bench.go([])
-    assert bench.position() == place * QUARTER, (
+    assert bench.position() == count * QUARTER, (
         "counts make the position even where phases were chosen"
     )
     for name in (

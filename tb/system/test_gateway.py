@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`moire twin` as a program of its own, and clients in this one: what a client can do on hardware
-it can do here, with the same bytes.
+"""`moire twin` runs as a separate program, and the clients in this one. A client can do here what
+it can do on hardware, with the same bytes.
 """
 
 import io
@@ -20,7 +20,7 @@ from moire.bus.transport import open_bus
 from moire.cli import command_line
 from moire.client.bus import Bus
 from moire.errors import BusGarbled, NoAnswer
-from twin import START_S, Twin, TwinTransport
+from twin import Twin, TwinTransport
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings(
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.filterwarnings(
 
 @contextmanager
 def served(*arguments):
-    """`moire twin` as a program, while it runs: where it is served."""
+    """Run `moire twin` as a program; the value is its ports."""
     command = [
         sys.executable,
         "-m",
@@ -53,8 +53,8 @@ def served(*arguments):
 
 @pytest.fixture(scope="module")
 def ports():
-    with served("--nodes", "1") as told:
-        yield told
+    with served("--nodes", "1") as ports:
+        yield ports
 
 
 def moire(*arguments, code=0):
@@ -68,20 +68,20 @@ def moire(*arguments, code=0):
     [("rfc2217", "mark"), ("rfc2217", "none"), ("tcp", "auto"), ("terminal", "auto")],
 )
 def test_every_entrance_leads_to_the_node(ports, entrance, parity):
-    told = moire("--port", ports[entrance], "--parity", parity, "selftest", "--", "status")
-    assert told[0]["passed"] and told[1]["state"] == "off"
+    results = moire("--port", ports[entrance], "--parity", parity, "selftest", "--", "status")
+    assert results[0]["passed"] and results[1]["state"] == "off"
 
 
 def test_homes_and_moves_over_the_network_and_another_client_sees_it(ports):
-    told = moire("--port", ports["tcp"], "home", "--", "move", "150um")
-    assert told[-1]["command"] == "move" and abs(told[-1]["error_nm"]) < 50
+    results = moire("--port", ports["tcp"], "home", "--", "move", "150um")
+    assert results[-1]["command"] == "move" and abs(results[-1]["error_nm"]) < 50
     seen = moire("--port", ports["rfc2217"], "status")[0]
     assert (
         seen["homed"] and abs(seen["position_nm"] - 150_000) < 50_000
-    )  # the drive is off: wound-up springs have relaxed
+    )  # the drive is off, so the springs have relaxed
 
 
-def test_a_client_at_another_rate_hears_nobody_and_spoils_nothing(ports):
+def test_a_client_at_another_rate_receives_nothing_and_disturbs_nothing(ports):
     with open_bus(ports["rfc2217"], baud=19200, parity="mark") as port:
         with pytest.raises(NoAnswer, match="check power, wiring, baud rate and address"):
             Bus(port, tries=2).node()
@@ -89,12 +89,12 @@ def test_a_client_at_another_rate_hears_nobody_and_spoils_nothing(ports):
 
 
 @pytest.mark.parametrize("apart_s", [0.0053, 0.01, 0.0177])
-def test_two_nodes_with_one_address_are_told_apart_from_silence(apart_s):
+def test_two_nodes_with_one_address_are_distinguished_from_silence(apart_s):
     with TwinTransport(Twin(nodes=(1, 1))) as line:
         line.twin.power_cut(1)
         line.wait(apart_s)
         line.twin.power_on(1)
-        line.wait(START_S)
+        line.twin.run_until_ready()
         with pytest.raises(BusGarbled, match="two nodes with the address 1"):
             Bus(line).find()
 
@@ -118,8 +118,8 @@ def test_a_recorded_session_replays_on_the_twin_to_the_last_bit(tmp_path):
         "--",
         "status",
     )
-    told = moire("--port", "twin", "replay", file)[0]
-    assert told["same"] > 10 and told["other_values"] == told["different"] == 0
+    result = moire("--port", "twin", "replay", file)[0]
+    assert result["same"] > 10 and result["other_values"] == result["different"] == 0
     rows = moire("replay", file, "--show")[0]["said"]
     assert [row.split("s  ")[1] for row in rows if "break" in row or "baud from" in row] == [
         "300000 baud from here on",
@@ -142,7 +142,7 @@ def test_the_scope_sees_what_the_machine_does_and_the_plant_is_found():
         record, trace = scope.wait(), twin.take_trace(0)
         seen, times = numpy.array(record.position_nm), numpy.array(record.time_s)
         assert record.before == 10 and seen[-1] - seen[0] == pytest.approx(100_000, abs=50)
-        # the record has no absolute time: it is the true way, some shift away
+        # the record has no absolute time: it equals the true motion with a shift in time
         after = times >= 0
         worst = min(
             abs(
@@ -151,7 +151,7 @@ def test_the_scope_sees_what_the_machine_does_and_the_plant_is_found():
             ).max()
             for shift in trace["time_s"][0] + numpy.arange(0, 0.1, 1e-5)
         )
-        assert worst < 0.1e-3 * 4.8e6  # a time is right to 0.1 ms, at the top speed
+        assert worst < 0.1e-3 * 4.8e6  # a time is right to 0.1 ms, here at the top speed
         assert max(record.command) > 0.05
 
         plant = identify_samples(*lsb(excite(axis, "40%")), 1 / axis.node.identity.tick_hz)

@@ -11,35 +11,13 @@ from moire.client.indexing_table import TURN, IndexingTable
 from moire.client.job import Job
 from moire.client.settings import Settings
 from tb.bench import seed
+from tb.system.station_node import AXIS, NODE
 from twin import Twin, TwinTransport, build
 from twin.devices.devices import Devices
-from twin.nodes.twin import Axis, Node, drives
+from twin.nodes.twin import Axis, Node
 
-MAIN, SUB = 0, 1  # places
-NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
-AXIS = {
-    "period": "1um",
-    "drive": "steps",
-    "position_source": "own_steps",
-    "steps_per_period": 4,
-    "counts_per_period": 4,
-    "disagreement_limit": 0,
-    "encoder_fault_mask": 0,
-    "kp": 0,
-    "ki": 0,
-    "kd": 0,
-    "kv": 0,
-    "ka": 0,
-    "following_limit": "10mm",
-    "velocity": "20mm/s",
-    "acceleration": "100mm/s2",
-    "jerk": "1000mm/s3",
-    "homing_latch_speed": "0.2mm/s",
-    "settle_window": "1um",
-    "settle_time": "5ms",
-    "watchdog_time": "60s",
-}
-AROUND = Devices(
+MAIN, SUB = 0, 1  # indices of the nodes in the twin
+DEVICES = Devices(
     eeprom=True,
     keypad=True,
     display=True,
@@ -51,7 +29,7 @@ AROUND = Devices(
 
 
 def test_a_job_is_cut_at_its_angles_through_a_power_cut_and_no_station_twice():
-    nodes = [Node(1, [Axis("unconnected")], AROUND), Node(2, [Axis("worm_table")])]
+    nodes = [Node(1, [Axis("unconnected")], DEVICES), Node(2, [Axis("worm_table")])]
     with Twin(
         nodes,
         seed=seed() % 1000,
@@ -67,36 +45,36 @@ def test_a_job_is_cut_at_its_angles_through_a_power_cut_and_no_station_twice():
         for address, role in ((1, "main"), (2, "sub")):
             Settings(bus.node(address)).set("peer_role", role)
             Settings(bus.node(address)).set("peer_mode", "frames")
-        job, around, here = (
+        job, devices, here = (
             Job(bus.node(1)),
-            twin.around[MAIN],
+            twin.devices(MAIN),
             IndexingTable(bus.node(2)).sensor().angle,
         )
         first = round(here) + 200 if here < TURN - 500 else 100
         angles = [first, first + 150]
         assert job.load(angles).angles == tuple(angles)
-        around.type([0x1C, 0xF0, 0x1C])  # a person types: the keys wait
+        devices.type([0x1C, 0xF0, 0x1C])  # a person types, so the keys of the job wait
         job.start()
-        while not around.cuts:
+        while not devices.cuts:
             bus.transport.wait(0.1)
             assert job.state().state not in ("paused", "unsure"), job.state()
         twin.power_cut(MAIN)
         bus.transport.wait(0.2)
         twin.power_on(MAIN)
         bus.transport.wait(0.2)
-        asked = job.wait()
-        assert (asked.state, asked.cause, asked.station) == ("unsure", "power_lost", 0) and len(
-            around.cuts
+        report = job.wait()
+        assert (report.state, report.cause, report.station) == ("unsure", "power_lost", 0) and len(
+            devices.cuts
         ) == 1
-        bus.transport.wait(1.5)  # the panel is found
-        assert around.lines[1].rstrip() == "the power was lost" and around.cuts[0].whole
+        bus.transport.wait(1.5)  # the node has found its panel again
+        assert devices.lines[1].rstrip() == "the power was lost" and devices.cuts[0].complete
         job.do("next")
         assert job.wait().state == "finished"
         assert all(
             abs(math.degrees(cut.angle_start_rad) * 3600 - angle) <= 2
-            for cut, angle in zip(around.cuts, angles, strict=True)
+            for cut, angle in zip(devices.cuts, angles, strict=True)
         )
         assert all(
-            abs(math.degrees(cut.angle_end_rad - cut.angle_start_rad)) * 3600 < 0.1 and cut.whole
-            for cut in around.cuts
+            abs(math.degrees(cut.angle_end_rad - cut.angle_start_rad)) * 3600 < 0.1 and cut.complete
+            for cut in devices.cuts
         )

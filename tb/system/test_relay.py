@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay, pins to pins: it passes, corrects, flags, takes sets over the line and from flash, and
-loses no count.
+"""relay, from pins to pins: it passes the counts on, corrects them, sets its flags, loads sets over
+the bus and from flash, and loses no count.
 """
 
 import math
@@ -41,28 +41,28 @@ class Relay:
 
     def __init__(self, dut, chip=None):
         self.dut, self.chip = dut, chip or Flash(1 << 14)
-        self.place = 0  # of the ring, counts from its index; the index is one count wide
+        self.count = 0  # counts of the ring from its index, which is one count wide
         self.counted, self.levels, self.edges = 0, None, []
         self.clks, self.index_at = 0, []
         self.with_index = True
         self.sequence = 0
 
-    async def power_up(self, place=0):
-        self.place = place
+    async def power_up(self, count=0):
+        self.count = count
         await start(self.dut, **IDLE)
         await FallingEdge(self.dut.clk)
         self.show()
         self.dut.rst.value = 1
         await self.clk(4)
         self.dut.rst.value = 0
-        self.counted, self.levels = place, None
+        self.counted, self.levels = count, None
         await self.clk(16)
         return self
 
     def show(self):
-        b = self.place >> 1 & 1
-        self.dut.encoder_a.value, self.dut.encoder_b.value = b ^ self.place & 1, b
-        self.dut.encoder_z.value = int(self.place % COUNTS == 0 and self.with_index)
+        b = self.count >> 1 & 1
+        self.dut.encoder_a.value, self.dut.encoder_b.value = b ^ self.count & 1, b
+        self.dut.encoder_z.value = int(self.count % COUNTS == 0 and self.with_index)
 
     async def clk(self, count=1):
         dut = self.dut
@@ -84,12 +84,12 @@ class Relay:
 
     async def go(self, steps, clk_each=2):
         for _ in range(abs(steps)):
-            self.place += 1 if steps > 0 else -1
+            self.count += 1 if steps > 0 else -1
             self.show()
             await self.clk(clk_each)
 
     async def latencies(self):
-        """clk from an edge in to the edge out, four times."""
+        """Cycles from an edge at the input to the edge at the output, four times."""
         await self.go(8, clk_each=30)
         self.edges.clear()
         took = []
@@ -103,19 +103,19 @@ class Relay:
         while not int(self.dut.flash_chip_n.value) or self.clks < 2 * 2048 + 2 * 65 * 60:
             await self.clk(50)
 
-    async def tell(self, words):
+    async def send(self, words):
         for word in words:
             for level in (0, *(word >> n & 1 for n in range(9)), 1):
                 self.dut.rs485_rx.value = level
                 await self.clk(BIT)
 
-    async def listen(self, patience=6000):
-        """The words that the relay sends until it lets go of the line."""
+    async def receive(self, timeout_clk=6000):
+        """The words that the relay sends until it switches its driver off."""
         words, waited = [], 0
         while not int(self.dut.rs485_driver_enable.value):
             await self.clk()
             waited += 1
-            if waited > patience:
+            if waited > timeout_clk:
                 return words
         while int(self.dut.rs485_driver_enable.value):
             if int(self.dut.rs485_tx.value):
@@ -130,54 +130,56 @@ class Relay:
             assert bits[9] == 1
         return words
 
-    async def ask(self, kind, payload=b"", repeat=False):
-        """The answer, without sequence and kind; None if there is none."""
+    async def request(self, kind, payload=b"", repeat=False):
+        """Send a request; returns the answer without sequence and kind, or None if there is no
+        answer.
+        """
         self.sequence = (self.sequence + (not repeat)) % 256
         exchange = Exchange(bytes([self.sequence, kind]) + payload, tries=1)
-        await self.tell(exchange.words_to_send())
-        words = await self.listen()
+        await self.send(exchange.words_to_send())
+        words = await self.receive()
         if not words:
             return None
         exchange.feed(words)
         return exchange.result()
 
     async def status(self):
-        return Status.of(await self.ask(STATUS))
+        return Status.of(await self.request(STATUS))
 
     async def clear(self, flags=0xFF):
-        return Status.of(await self.ask(CLEAR, bytes([flags])))
+        return Status.of(await self.request(CLEAR, bytes([flags])))
 
-    async def give(self, whole):
-        """A set, piece by piece; what the last answer tells."""
-        for n in range(0, len(whole), PIECE):
-            told = await self.ask(SET if n else BEGIN_SET, bytes(whole[n : n + PIECE]))
-        return Status.of(told)
+    async def send_set(self, relay_set):
+        """Send a set in pieces; returns the status of the last answer."""
+        for n in range(0, len(relay_set), PIECE):
+            answer = await self.request(SET if n else BEGIN_SET, bytes(relay_set[n : n + PIECE]))
+        return Status.of(answer)
 
-    async def save(self, whole, address):
-        """One copy, into an erased sector."""
+    async def save(self, relay_set, address):
+        """Save one copy into an erased sector."""
         for command, at, more in (
             (0x20, address, b""),
-            *((0x02, address + n, whole[n : n + 32]) for n in range(0, len(whole), 32)),
+            *((0x02, address + n, relay_set[n : n + 32]) for n in range(0, len(relay_set), 32)),
         ):
-            await self.ask(FLASH, b"\x06")
-            await self.ask(FLASH, bytes([command]) + at.to_bytes(3, "big") + more)
+            await self.request(FLASH, b"\x06")
+            await self.request(FLASH, bytes([command]) + at.to_bytes(3, "big") + more)
 
 
-def wanted(place, terms):
+def corrected(count, terms):
     """The corrected position, counts."""
-    return place - exact(terms, place / COUNTS)
+    return count - exact(terms, count / COUNTS)
 
 
 @cocotb.test()
 async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
     terms = some_terms()
-    relay = await Relay(dut).power_up(place=COUNTS - 60)
+    relay = await Relay(dut).power_up(count=COUNTS - 60)
     await relay.booted()
-    await relay.give(image(terms, COUNTS))
+    await relay.send_set(image(terms, COUNTS))
     assert not int(dut.correcting.value)
     await relay.go(50, clk_each=4)
     await relay.clk(40)
-    assert relay.counted == relay.place and not int(dut.correcting.value)
+    assert relay.counted == relay.count and not int(dut.correcting.value)
     assert (await relay.status()).levels == LOADED
     await relay.go(100, clk_each=4)
     await relay.clk(400)
@@ -185,12 +187,15 @@ async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
     for steps in (0, 700, -1500, 333):
         await relay.go(steps)
         await relay.clk(400)
-        assert abs(relay.counted - wanted(relay.place, terms)) <= 0.76, (relay.place, relay.counted)
+        assert abs(relay.counted - corrected(relay.count, terms)) <= 0.76, (
+            relay.count,
+            relay.counted,
+        )
     status = await relay.status()
     assert (
         status.levels == KNOWN | LOADED | CORRECTING
         and status.flags == 0
-        and status.position == relay.place - COUNTS + 60
+        and status.position == relay.count - COUNTS + 60
     )
 
 
@@ -202,22 +207,22 @@ async def latency_is_10(dut):
 @cocotb.test()
 async def z_comes_once_a_turn_where_the_corrected_position_is_zero(dut):
     terms = [term_of(4.0, math.pi / 2), (0, 0)]
-    relay = await Relay(dut).power_up(place=-20)
+    relay = await Relay(dut).power_up(count=-20)
     await relay.booted()
-    await relay.give(image(terms, COUNTS, hysteresis=0))
+    await relay.send_set(image(terms, COUNTS, hysteresis=0))
     await relay.go(100, clk_each=4)
     relay.index_at.clear()
-    for way in (-200, 200):
-        await relay.go(way, clk_each=4)
+    for steps in (-200, 200):
+        await relay.go(steps, clk_each=4)
         await relay.clk(30)
     assert set(relay.index_at) == {0}
 
 
 @cocotb.test()
 async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(dut):
-    relay = await Relay(dut).power_up(place=-4)
+    relay = await Relay(dut).power_up(count=-4)
     await relay.booted()
-    await relay.give(image(some_terms(), COUNTS))
+    await relay.send_set(image(some_terms(), COUNTS))
     await relay.go(20)
     relay.with_index = False
     await relay.go(COUNTS + 10)
@@ -225,7 +230,7 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
     assert (await relay.clear(~MISSING & 0xFF)).flags == MISSING and (
         await relay.clear(MISSING)
     ).flags == 0
-    relay.place += 2
+    relay.count += 2
     relay.show()
     await relay.clk(30)
     assert (await relay.status()).flags & ILLEGAL
@@ -233,28 +238,28 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
 
 @cocotb.test()
 async def a_glitch_is_rejected_and_flagged(dut):
-    relay = await Relay(dut).power_up(place=-4)
+    relay = await Relay(dut).power_up(count=-4)
     await relay.booted()
-    await relay.give(image(some_terms(0.001), COUNTS, filter_required=4))
+    await relay.send_set(image(some_terms(0.001), COUNTS, filter_required=4))
     await relay.go(20, clk_each=8)
     dut.encoder_a.value = 1 - int(dut.encoder_a.value)
     await relay.clk(2)
     relay.show()
     await relay.clk(30)
-    assert relay.counted == relay.place and (await relay.status()).flags == REJECTED
+    assert relay.counted == relay.count and (await relay.status()).flags == REJECTED
 
 
 @cocotb.test()
 async def a_broken_set_is_refused_and_the_one_in_force_stays(dut):
     relay = await Relay(dut).power_up()
     await relay.booted()
-    whole = image(some_terms(), COUNTS)
-    await relay.give(whole)
+    relay_set = image(some_terms(), COUNTS)
+    await relay.send_set(relay_set)
     for _ in range(3):
         broken = bytearray(image(some_terms(9.0), COUNTS))
         broken[random.randrange(len(broken))] ^= 1 << random.randrange(8)
-        told = await relay.give(broken)
-        assert told.flags == REFUSED and told.identity == identity_of(whole)
+        answer = await relay.send_set(broken)
+        assert answer.flags == REFUSED and answer.identity == identity_of(relay_set)
         assert (await relay.clear()).flags == 0
 
 
@@ -262,11 +267,13 @@ async def a_broken_set_is_refused_and_the_one_in_force_stays(dut):
 async def a_set_whose_pieces_are_asked_for_twice_is_taken_all_the_same(dut):
     relay = await Relay(dut).power_up()
     await relay.booted()
-    whole = image(some_terms(), COUNTS)
-    for n in range(0, len(whole), 20):
+    relay_set = image(some_terms(), COUNTS)
+    for n in range(0, len(relay_set), 20):
         for repeat in (False, True, True):
-            told = await relay.ask(SET if n else BEGIN_SET, whole[n : n + 20], repeat=repeat)
-    assert Status.of(told).identity == identity_of(whole) and Status.of(told).flags == 0
+            answer = await relay.request(
+                SET if n else BEGIN_SET, relay_set[n : n + 20], repeat=repeat
+            )
+    assert Status.of(answer).identity == identity_of(relay_set) and Status.of(answer).flags == 0
 
 
 @cocotb.test()
@@ -281,8 +288,8 @@ async def flash_bytes_asked_for_while_it_boots_wait_their_turn(dut):
     relay.chip.memory[0x3000:0x3002] = b"ok"
     assert (await relay.status()).levels == READING
     exchange = Exchange(bytes([77, FLASH, 0x03, 0x00, 0x30, 0x00, 0, 0]), tries=1)
-    await relay.tell(exchange.words_to_send())
-    exchange.feed(await relay.listen(patience=20_000))
+    await relay.send(exchange.words_to_send())
+    exchange.feed(await relay.receive(timeout_clk=20_000))
     assert exchange.result()[4:] == b"ok"
 
 
@@ -294,10 +301,10 @@ async def a_broken_request_has_no_answer_and_the_next_one_has(dut):
     for n in range(len(words)):
         broken = list(words)
         broken[n] ^= 1 << random.randrange(9)
-        await relay.tell(broken)
-        assert await relay.listen(patience=400) == []
+        await relay.send(broken)
+        assert await relay.receive(timeout_clk=400) == []
     assert await relay.status()
-    assert await relay.ask(99) is None
+    assert await relay.request(99) is None
 
 
 @cocotb.test()
@@ -307,14 +314,14 @@ async def a_saved_set_comes_back_at_power_up_whenever_power_failed(dut):
     for second, power, source in (
         (old, 4096 + 10, 1),
         (new, 4096 + 30, 2),
-    ):  # it failed in the second copy, in the first
+    ):  # the power failed while the second or the first copy was written
         for address in (FIRST, SECOND):
             chip.memory[address : address + len(old)] = old
         chip.power, chip.asleep = None, True
         relay = await Relay(dut, chip).power_up()
         await relay.booted()
         if second is new:
-            chip.memory[SECOND : SECOND + len(new)] = new  # the second copy stands already
+            chip.memory[SECOND : SECOND + len(new)] = new  # the second copy is written already
         chip.power = power
         await relay.save(new, SECOND if second is old else FIRST)
         chip.power, chip.asleep = None, True
@@ -330,18 +337,18 @@ async def flash_bytes_come_back(dut):
     relay = await Relay(dut).power_up()
     await relay.booted()
     relay.chip.memory[0x3000:0x3004] = b"ring"
-    assert (await relay.ask(FLASH, bytes([0x03, 0x00, 0x30, 0x00]) + bytes(4)))[4:] == b"ring"
+    assert (await relay.request(FLASH, bytes([0x03, 0x00, 0x30, 0x00]) + bytes(4)))[4:] == b"ring"
 
 
 @cocotb.test()
 async def reset_in_mid_flow(dut):
-    relay = await Relay(dut).power_up(place=-4)
+    relay = await Relay(dut).power_up(count=-4)
     await relay.booted()
-    await relay.give(image(some_terms(), COUNTS))
+    await relay.send_set(image(some_terms(), COUNTS))
     await relay.go(30)
-    await relay.tell(Exchange(bytes([1, BEGIN_SET, 1, 2])).words_to_send()[:4])
+    await relay.send(Exchange(bytes([1, BEGIN_SET, 1, 2])).words_to_send()[:4])
     dut.rst.value = 1
-    for n in range(24):  # the pins find the levels of the ring again
+    for n in range(24):  # the outputs return to the levels of the ring
         dut.rst.value, relay.levels = int(n < 3), None
         await relay.clk()
     assert not int(dut.correcting.value) and not int(dut.fault.value)

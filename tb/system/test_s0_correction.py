@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The correction on its way from the learner to the position: the firmware's learner on this
-computer learns the interferometer, the
-node is told the values over the line, and its positions are held against the true place of the
-table."""
+"""The correction from the calibration to the position. The compiled calibration of the firmware
+determines the errors of the interferometer, the values are written to the node over the bus, and
+the positions of the node are compared with the true position of the table.
+"""
 
 import random
 
@@ -12,24 +12,24 @@ import pytest
 from figures import calibration as figures_calibration
 from moire.client.axis import CORRECTION
 from moire.client.bus import Bus
-from twin import START_S, Twin, TwinTransport
+from twin import Twin, TwinTransport
 from twin.parameters import tables as parameters
 
 PLACES = 16  # of a period
-LOOKS = 8  # at each: the noise of one is 0.7 nm
-LOADING_S = 0.6  # until the node has computed the table and taken it over
+LOOKS = 8  # readings at each position: the noise of one is 0.7 nm
+LOADING_S = 0.6  # time until the table of the node is computed and in force
 
 
 @pytest.fixture(scope="module")
 def machine_and_axis():
     with Twin(nodes=(1,), plant=figures_calibration.HARMONICS_OF_TWIN) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(1))
-        bus.transport.wait(START_S)
+        twin.run_until_ready()
         yield twin.machine(), bus.axis(1)
 
 
 @pytest.fixture(scope="module")
-def learned():
+def calibrated():
     machine, *_ = figures_calibration.calibrated(
         1,
         0,
@@ -47,8 +47,8 @@ def learned():
 
 def left_nm(machine, axis, correction):
     """Largest difference of the node's position from the true one over a period with this
-    correction, the mean taken off. The table
-    stands at each place."""
+    correction, without its mean. The table
+    rests at each position."""
     axis.set_correction(correction)
     axis.node.bus.transport.wait(LOADING_S)
     away = []
@@ -61,12 +61,14 @@ def left_nm(machine, axis, correction):
     return np.abs(np.array(away) - np.mean(away)).max()
 
 
-def test_harmonics_that_were_learned_come_off_every_position(machine_and_axis, learned):
+def test_harmonics_of_the_calibration_are_subtracted_from_every_position(
+    machine_and_axis, calibrated
+):
     machine, axis = machine_and_axis
     flat = {"cosine": [0] * 10, "sine": [0] * 10}
     uncorrected = left_nm(machine, axis, {**dict.fromkeys(CORRECTION, 0), "gain": 65536, **flat})
-    ellipse = left_nm(machine, axis, {**learned, **flat})
-    harmonics = left_nm(machine, axis, learned)
+    ellipse = left_nm(machine, axis, {**calibrated, **flat})
+    harmonics = left_nm(machine, axis, calibrated)
     assert uncorrected > 6 and ellipse > 3 and harmonics < 1, (
         f"{uncorrected:.2f}, {ellipse:.2f}, {harmonics:.2f} nm"
     )

@@ -13,8 +13,8 @@ from tb.bench import seed
 SEED = seed()
 X = "X"
 BOUND_NM = 5.0
-ZERO_VOLT = 32768  # code of the converter
-NEWTON = 20.0  # pushes the table against the screw, and does not turn it
+ZERO_VOLT = 32768  # code of the DAC
+NEWTON = 20.0  # pushes the table against the screw without turning it
 DRIFT_NM = 1200.0
 
 
@@ -22,14 +22,14 @@ DRIFT_NM = 1200.0
 def prepared():
     print(f"SEED={SEED}")
     stage = FineStage.power_up(SEED)
-    learned = stage.prepare(X)
-    assert learned.accepted == 1 and learned.refused == 0
+    calibration = stage.prepare(X)
+    assert calibration.accepted == 1 and calibration.refused == 0
     return stage
 
 
 @pytest.fixture
 def stage(prepared):
-    """Fine stage holding at 0.1 mm, nothing latched."""
+    """The stage holds at 0.1 mm with its fine stage; no fault is latched."""
     axis = prepared.axes[X]
     if axis.status().faults:
         axis.reset()
@@ -51,16 +51,16 @@ def test_moves_end_within_5_nm(stage):
         assert converter(stage) != ZERO_VOLT, "and the piezo holds"
 
 
-def test_it_stands_within_a_nanometre(stage):
+def test_it_holds_its_position_within_a_nanometre(stage):
     stage.dwell(0.2)
     true = stage.watch(X, 0.5)["true_nm"]
     assert true.std() <= 1 and abs(true.mean() - 1e5) <= BOUND_NM
 
 
-def test_neither_hand_over_throws_it(stage):
-    """Released at once, the motor springs back by 0.3 um."""
+def test_neither_hand_over_disturbs_the_position(stage):
+    """If it were released at once, the motor would spring back by 0.3 um."""
     before = stage.machine(X).state
-    assert abs(before.piezo_m) > 30e-9, "there is something to give back"
+    assert abs(before.piezo_m) > 30e-9, "there is a deflection to hand back"
     move, trace = stage.watch_move(X, 1e5 + 1000)
     error = trace["true_nm"] - move.target_nm
     arrived = int(np.flatnonzero(np.abs(error) <= 100)[0])
@@ -70,7 +70,7 @@ def test_neither_hand_over_throws_it(stage):
     assert steps.max() <= 100, "the converter never jumps"
 
 
-def test_a_table_that_is_pushed_is_kept_by_the_piezo(stage):
+def test_a_table_that_is_pushed_is_held_by_the_piezo(stage):
     before = stage.machine(X).state.piezo_m
     for newton in np.linspace(0, NEWTON, 20):
         stage.machine(X).push(newton)
@@ -85,9 +85,9 @@ def test_a_table_that_is_pushed_is_kept_by_the_piezo(stage):
 
 
 def drift(stage, first_nm, last_nm):
-    """The scale creeps along its machine, 10 nm at a time."""
-    for place in np.arange(first_nm, last_nm, 10.0 if last_nm > first_nm else -10.0):
-        stage.machine(X).set(grating_offset=place * 1e-9)
+    """Move the scale along its machine in steps of 10 nm."""
+    for offset in np.arange(first_nm, last_nm, 10.0 if last_nm > first_nm else -10.0):
+        stage.machine(X).set(grating_offset=offset * 1e-9)
         stage.dwell(0.01)
     stage.machine(X).set(grating_offset=last_nm * 1e-9)
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The S0 stage as shipped: RTL and firmware of both nodes, the machine around them, the host
-package at the end of the line.
+"""The S0 stage as shipped: RTL and firmware of both nodes, the machine, and the host package on the
+bus.
 """
 
 import random
@@ -33,9 +33,7 @@ def homed():
 
 @pytest.fixture
 def stage(homed):
-    """The homed stage with both drives on, holding. The test may leave any fault behind that a
-    reset clears.
-    """
+    """The homed stage holds with both drives on. A test may leave any fault that a reset clears."""
     for axis in homed.axes.values():
         if axis.status().faults:
             axis.reset()
@@ -43,9 +41,9 @@ def stage(homed):
     return homed
 
 
-def rest(stage, name):
-    """True position, told position and target: what a refused command must not change. Looks long
-    enough to see a motion begin.
+def steady_state(stage, name):
+    """True position, reported position and target, which a refused command must not change. It
+    waits long enough for a motion to show.
     """
     stage.dwell(0.05)
     status = stage.axes[name].status()
@@ -59,7 +57,7 @@ def refused(cause, call, *arguments, **named):
     return str(caught.value)
 
 
-# ------------------------------------------------------------------ the main way
+# ------------------------------------------------------------------ the usual operation
 
 
 def test_power_up_finds_both_nodes_with_drives_off_and_no_zero():
@@ -78,7 +76,7 @@ def test_power_up_finds_both_nodes_with_drives_off_and_no_zero():
         )
         assert stage.true_nm(name, from_zero=False) != pytest.approx(
             status.position_nm, abs=1000
-        ), "the place at power-up is unknown"
+        ), "the position at power-up is unknown"
         refused("not_enabled", axis.move, nm=0)
         axis.enable()
         refused("not_homed", axis.move, nm=0)
@@ -176,9 +174,9 @@ def test_stop_in_mid_move_keeps_the_axis_under_control(stage):
 
 
 def sub_division_errors(stage, name, count=12, looks=8):
-    """True position less that of the encoder, in nm, at places spread over a period; the mean of
-    some looks, since a stage that is held
-    moves by a nanometre or two between the one and the other."""
+    """True position less that of the encoder, in nm, at positions spread over a period; the mean of
+    some readings, since a stage that holds its position moves by a nanometre or two between them.
+    """
     errors = []
     for n in range(count):
         stage.move(name, 1000 * n + PERIOD_NM * n / count)
@@ -189,7 +187,7 @@ def sub_division_errors(stage, name, count=12, looks=8):
     return errors
 
 
-def test_the_learner_takes_the_ellipse_off_in_motion(stage):
+def test_the_calibration_removes_the_ellipse_in_motion(stage):
     axis = stage.axes["Y"]
     before = sub_division_errors(stage, "Y")
     axis.calibration("calibrate")
@@ -197,8 +195,8 @@ def test_the_learner_takes_the_ellipse_off_in_motion(stage):
         stage.move("Y", 0.3e6 if n % 2 else 0.7e6)
         if axis.calibration("read").accepted:
             break
-    learner = axis.calibration("freeze")
-    assert learner.accepted == 1 and learner.refused == 0, learner
+    calibration = axis.calibration("freeze")
+    assert calibration.accepted == 1 and calibration.refused == 0, calibration
     after = sub_division_errors(stage, "Y")
     spread = [max(errors) - min(errors) for errors in (before, after)]
     assert spread[1] < spread[0] / 3 and spread[1] < 2.5, (
@@ -224,8 +222,8 @@ def test_positions_are_captured_on_demand(stage):
 
 
 def fault_during_move(stage, name, provoke, distance_nm=0.5e6):
-    """Begin a move, provoke a fault in its middle; returns the status soon after and the true place
-    of the axis then.
+    """Begin a move and provoke a fault in its middle; returns the status soon after and the true
+    position of the axis at that time.
     """
     axis = stage.axes[name]
     here = axis.status().position_nm
@@ -243,9 +241,9 @@ def assert_stopped_by(stage, name, cause):
     refused("faulted", axis.move, nm=0)
     refused("faulted", axis.enable)
     stage.dwell(0.1)
-    place = stage.true_nm(name)
+    position = stage.true_nm(name)
     stage.dwell(0.1)
-    assert abs(stage.true_nm(name) - place) < 100, "the axis stands"
+    assert abs(stage.true_nm(name) - position) < 100, "the axis is at rest"
     return status
 
 
@@ -269,12 +267,12 @@ def test_limit_switch_stops_the_drive_and_lets_the_axis_leave(stage):
     assert_position_survived(stage, "X")
     axis.reset()
     axis.enable()
-    place = stage.true_nm("X")
+    position = stage.true_nm("X")
     axis.request(
         "move", target=axis.to_counts(-1.29e6)
-    )  # further in: the guard lets no command pass
+    )  # further in: the interlock passes no command
     stage.dwell(0.3)
-    assert place - 100 < stage.true_nm("X") < place + 5000
+    assert position - 100 < stage.true_nm("X") < position + 5000
     axis.disable()
     axis.reset()
     axis.enable()
@@ -283,7 +281,7 @@ def test_limit_switch_stops_the_drive_and_lets_the_axis_leave(stage):
     assert not axis.status().faults
 
 
-def test_emergency_stop_takes_the_drive_at_once_and_holds_until_reset(stage):
+def test_the_emergency_stop_disables_the_drive_at_once_until_it_is_reset(stage):
     axis = fault_during_move(stage, "X", lambda: stage.twin.inject("estop", AXIS["X"]))
     stage.twin.run(1e-5)
     assert not stage.twin.truth(AXIS["X"]).enabled, "off within 10 us, whatever the soft core does"
@@ -312,7 +310,7 @@ def test_cut_cable_stops_both_drives(stage):
         axis.enable()
 
 
-def test_encoder_cut_is_a_fault_and_takes_the_zero_away(stage):
+def test_a_cut_encoder_is_a_fault_and_clears_the_zero(stage):
     axis = fault_during_move(stage, "Y", lambda: stage.twin.inject("encoder_cut", AXIS["Y"]))
     stage.dwell(0.01)
     assert_stopped_by(stage, "Y", "encoder")
@@ -335,7 +333,7 @@ def test_jammed_motor_is_a_following_error(stage):
     assert_position_survived(stage, "X")
 
 
-def test_drive_fault_pin_takes_the_drive(stage):
+def test_the_drive_fault_pin_disables_the_drive(stage):
     axis = fault_during_move(
         stage, "X", lambda: stage.twin.inject("drive_fault", AXIS["X"]), distance_nm=-0.2e6
     )
@@ -347,18 +345,18 @@ def test_drive_fault_pin_takes_the_drive(stage):
     axis.reset()
 
 
-# ------------------------------------------------------------------ the line
+# ------------------------------------------------------------------ the bus
 
 
-def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
+def test_nonsense_on_the_bus_moves_nothing_and_the_next_command_works(stage):
     axis = stage.axes["X"]
-    before = rest(stage, "X")
+    before = steady_state(stage, "X")
     bad = axis.node.counters()
     for n in range(3):
         stage.twin.send_nonsense(400, seed=SEED + n)
         stage.dwell(0.02)
         assert stage.axes["X"].status().state == "holding"
-    after = rest(stage, "X")
+    after = steady_state(stage, "X")
     assert after[1] == before[1] and abs(after[0] - before[0]) < BOUND_NM
     now, kinds = axis.node.counters(), ("framing_errors", "frames_bad", "start_glitches")
     assert sum(now[kind] for kind in kinds) > sum(bad[kind] for kind in kinds)
@@ -366,7 +364,7 @@ def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
 
 
 def send_frame(stage, address, body, crc_flip=0, length=None):
-    """A write frame by hand; returns the words that came back to the command byte and to the
+    """Send a write frame by hand; returns the words of the answers to the command byte and the
     payload.
     """
     import zlib
@@ -383,13 +381,13 @@ def send_frame(stage, address, body, crc_flip=0, length=None):
 
 def test_bad_crc_is_not_obeyed_and_counted(stage):
     axis = stage.axes["X"]
-    before, bad = rest(stage, "X"), axis.node.counters()["frames_bad"]
+    before, bad = steady_state(stage, "X"), axis.node.counters()["frames_bad"]
     body = request_body("move", 77, axis=0, target=axis.to_counts(0.5e6))
     for crc_flip in (1, 0x80000000, 0xFFFFFFFF):
         ready, more = send_frame(stage, ADDRESSES["X"], body, crc_flip=crc_flip)
         assert ready == [0x60 | ADDRESSES["X"]] and more == [], "silent to nonsense"
     assert axis.node.counters()["frames_bad"] == bad + 3
-    assert rest(stage, "X")[1] == before[1]
+    assert steady_state(stage, "X")[1] == before[1]
 
 
 def test_a_frame_under_another_nodes_address_is_not_obeyed(stage):
@@ -401,7 +399,7 @@ def test_a_frame_under_another_nodes_address_is_not_obeyed(stage):
     body = request_body("move", 78, axis=0, target=stage.axes["X"].to_counts(0.5e6))
     payload = bytes([len(body)]) + body
     crc = zlib.crc32(bytes([0x20 | ADDRESSES["X"]]) + payload).to_bytes(4, "little")
-    before = rest(stage, "Y")
+    before = steady_state(stage, "Y")
     bad = stage.axes["Y"].node.counters()["frames_bad"]
     transport = stage.bus.transport
     transport.send([0x120 | ADDRESSES["Y"]])
@@ -409,7 +407,7 @@ def test_a_frame_under_another_nodes_address_is_not_obeyed(stage):
     transport.send(list(payload + crc))
     transport.wait(0.005)
     assert stage.axes["Y"].node.counters()["frames_bad"] == bad + 1
-    assert rest(stage, "Y")[1] == before[1]
+    assert steady_state(stage, "Y")[1] == before[1]
 
 
 def test_a_repeated_request_is_answered_again_and_not_acted_on_again(stage):
@@ -432,7 +430,7 @@ def test_a_repeated_request_is_answered_again_and_not_acted_on_again(stage):
 
 
 def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatch):
-    before = rest(stage, "X")
+    before = steady_state(stage, "X")
     bodies = {
         bytes([41, 200]): "does not know this command",
         bytes([42, 5, 0, 1]): "wrong length",
@@ -445,26 +443,26 @@ def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatc
         reply = transport.receive(9, 0.01)
         assert reply[0] == 0x50 | ADDRESSES["X"] and reply[2] == body[0]
         assert words in CAUSES[reply[4]][1]
-    assert rest(stage, "X")[1] == before[1]
+    assert steady_state(stage, "X")[1] == before[1]
     stage.axes["X"].status()
 
 
-def test_address_of_nobody_is_said(stage):
+def test_an_address_without_a_node_is_reported(stage):
     with pytest.raises(NoAnswer, match="nobody answers at address 7"):
         stage.bus.node(7)
 
 
 def test_target_outside_the_travel_is_refused_with_the_travel(stage):
-    before = rest(stage, "X")
+    before = steady_state(stage, "X")
     for target in (-0.9e6, 119.7e6, 1e12):
-        said = refused("out_of_travel", stage.axes["X"].move, nm=target)
-        assert "-800um to 119.6mm" in said, said
-    assert rest(stage, "X")[1] == before[1]
+        message = refused("out_of_travel", stage.axes["X"].move, nm=target)
+        assert "-800um to 119.6mm" in message, message
+    assert steady_state(stage, "X")[1] == before[1]
 
 
 def test_parameter_out_of_range_is_refused_by_host_and_node(stage):
     axis = stage.axes["X"]
-    kept = axis.get_parameter("kp").counts
+    before = axis.get_parameter("kp").counts
     with pytest.raises(OutOfRange, match="kp allows"):
         axis.set_parameter("kp", 1000)
     refused(
@@ -475,7 +473,7 @@ def test_parameter_out_of_range_is_refused_by_host_and_node(stage):
         value=-1,
     )
     refused("unknown_parameter", axis.request, "get_parameter", parameter=250)
-    assert axis.get_parameter("kp").counts == kept
+    assert axis.get_parameter("kp").counts == before
 
 
 def test_commands_for_another_axis_and_in_mid_move_are_refused(stage):
@@ -497,9 +495,9 @@ def test_a_node_of_another_build_is_refused(stage, monkeypatch):
         Bus(stage.bus.transport, random_source=random.Random(SEED)).node(ADDRESSES["X"])
 
 
-def test_a_line_with_much_noise_still_brings_every_command_through_or_says_so(stage):
-    """Spikes on the line: replies are repeated, nothing wrong is obeyed; what does not come through
-    is an exception.
+def test_on_a_bus_with_much_noise_every_command_is_executed_or_reported_as_failed(stage):
+    """With spikes on the bus, replies are repeated and no wrong command is executed. A request that
+    fails is an exception.
     """
     axis = stage.axes["X"]
     target = axis.status().target_nm

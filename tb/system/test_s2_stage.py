@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S2 as shipped: three stepper axes with scales in one node; and its counters in front of pulses
+"""S2 as shipped: three stepper axes with scales in one node; and its counters, driven by pulses
 from C++.
 """
 
@@ -45,22 +45,22 @@ def test_as_many_counts_as_pulses_on_both_sides_of_the_origin(stage):
     for move in made:
         count_um = float(SCALES[move.axis].count_um)
         assert abs(move.counts * count_um - move.target_um) <= NEAR * count_um
-        assert abs(move.apart_um) < 2 * count_um  # the table itself, by the model
+        assert abs(move.apart_um) < 2 * count_um  # the true position of the table
     assert all(
         stage.twin.truth(n).lost_steps == 0 and stage.twin.truth(n).step_timing_errors == 0
         for n in range(3)
     )
 
 
-def test_two_places_that_read_the_same_on_16_bits_are_told_apart(stage):
+def test_two_positions_that_read_the_same_on_16_bits_are_distinguished(stage):
     reach = SCALES["Z"].word_mm * 500  # um: half a 16-bit counter
-    below, above = (stage.move("", {"Z": place})[0] for place in (-reach, reach))
+    below, above = (stage.move("", {"Z": target})[0] for target in (-reach, reach))
     turn = (above.counts - below.counts) - WORD
     assert abs(turn) <= 2 * NEAR and abs(above.counts % WORD - below.counts % WORD) <= 2 * NEAR
     assert below.counts < 0 < above.counts and below.wrong == above.wrong == 0
 
 
-def test_a_place_at_the_border_of_31_bits_is_counted_over(stage):
+def test_a_position_beyond_31_bits_is_counted(stage):
     stage.call_here("X", 1 << 29)
     border_um = (1 << 31) * float(SCALES["X"].count_um)
     made = [stage.move("", {"X": border_um + side * 200})[0] for side in (-1, 1, -1)]
@@ -81,7 +81,7 @@ def test_without_a_scale_its_own_steps_are_the_position(stage):
         "travel_low": "-10mm",
         "travel_high": "10mm",
         "deglitch": "10us",
-    }.items():  # longer than a step is high
+    }.items():  # longer than the high time of a step
         axis.set_parameter(name, value)
     axis.enable()
     axis.home()
@@ -94,15 +94,15 @@ def test_without_a_scale_its_own_steps_are_the_position(stage):
 # ------------------------------------------------------------------ pulses from C++
 
 
-def test_pulses_at_random_ways_and_speeds_are_all_counted_through_every_overflow():
+def test_pulses_of_random_distances_and_speeds_are_all_counted_through_every_overflow():
     axes = figures_s2s3.counted(SEED, 200_000)
     assert len(axes) == 3
-    for told in axes:
-        assert told["pulses"] >= 200_000 and told["wrong"] == 0 and told["reversals"] > 100
-        assert told["zero"] and told["word"] and told["long_word"] and told["whole"]
+    for result in axes:
+        assert result["pulses"] >= 200_000 and result["wrong"] == 0 and result["reversals"] > 100
+        assert result["zero"] and result["word"] and result["long_word"] and result["whole"]
 
 
-def test_pulses_closer_than_the_edge_filter_passes_are_missed_and_told():
+def test_pulses_closer_than_the_edge_filter_passes_are_missed_and_reported():
     bypassed, *filtered = figures_s2s3.counted(SEED, 20_000, "too_fast")
-    assert bypassed["wrong"] == 0  # an edge every clk is as fast as pins can be
-    assert all(told["wrong"] > 100 for told in filtered)
+    assert bypassed["wrong"] == 0  # an edge in each cycle is the highest rate
+    assert all(result["wrong"] > 100 for result in filtered)

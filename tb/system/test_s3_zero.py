@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S3 as shipped: a linear motor behind its converter, RTL and firmware, and every way to find its
-zero.
-"""
+"""S3 as shipped: a linear motor behind its DAC, RTL and firmware, and every homing method."""
 
 import random
 
@@ -27,7 +25,7 @@ def motor():
 
 
 def home(motor, method, start_m=None):
-    """Homes by a method; the count of the scale that is called zero."""
+    """Home by a method; returns the count of the scale that becomes zero."""
     if start_m is not None:
         motor.carry(start_m)
     motor.axis.disable()
@@ -38,19 +36,21 @@ def home(motor, method, start_m=None):
     return motor.twin.truth().scale_counts - status.counts
 
 
-def test_searches_from_both_sides_of_the_mark_and_from_on_it_find_the_same_count():
+def test_searches_from_both_sides_of_the_mark_and_from_the_mark_find_the_same_count():
     source, motor = random.Random(SEED), s3_zero.Motor(SEED)
     made = [motor.search()]
     for side in (-1, 1) * 4 + (0,):
         motor.carry(side * source.uniform(0.02e-3, 1e-3))
         made.append(motor.search())
-    made += [motor.search() for _ in range(3)]  # from where the one before ended: on the mark
+    made += [
+        motor.search() for _ in range(3)
+    ]  # each starts where the one before ended: on the index mark
     assert {search.zero_counts for search in made} == {0}
     assert {search.start_um > 0 for search in made} == {True, False}
     assert {len(search.directions.split(", ")) for search in made} >= {
         2,
         4,
-    }  # met at once, and only on the other side
+    }  # the edge is met at once, and only on the other side
     assert all(abs(search.remaining_um) < 2 for search in made)
 
 
@@ -70,20 +70,20 @@ def test_methods_1_and_2_take_the_first_mark_behind_the_switch(motor, method, st
 
 
 @pytest.mark.parametrize(("method", "edge"), [(17, LOW), (18, HIGH)])
-def test_methods_17_and_18_take_the_place_where_the_switch_opens(motor, method, edge):
+def test_methods_17_and_18_take_the_position_where_the_switch_opens(motor, method, edge):
     motor.axis.set_parameter("homing_latch_speed", "1mm/s")
-    place = home(motor, method, edge * 0.7e-6)
+    count = home(motor, method, edge * 0.7e-6)
     late = (
         motor.axis.get_parameter("homing_latch_speed").value * 1000 * 2 / 1000
-    )  # um in the two ms until the firmware looks
-    assert abs(place - edge) <= 2 + late
+    )  # um in the two ms until the firmware reads the switch
+    assert abs(count - edge) <= 2 + late
 
 
 @pytest.mark.parametrize("method", [35, 37])
-def test_methods_35_and_37_call_this_place_zero(motor, method):
+def test_methods_35_and_37_set_the_zero_here(motor, method):
     motor.carry(0.4e-3)
     here = motor.twin.truth().scale_counts
-    assert abs(home(motor, method) - here) <= 1  # the drive comes on there
+    assert abs(home(motor, method) - here) <= 1  # the position at which the drive is enabled
     assert motor.axis.status().position_nm == pytest.approx(0, abs=2000)
 
 
@@ -97,10 +97,10 @@ def test_a_search_without_a_mark_in_reach_ends_with_its_cause_and_the_axis_under
     assert status.state == "holding" and status.enabled and not status.homed and not status.faults
     before = motor.position_um
     motor.axis.dwell(0.1)
-    assert abs(motor.position_um - before) < 2  # it stands
+    assert abs(motor.position_um - before) < 2  # it is at rest
 
 
-def test_a_mark_that_is_stuck_is_no_zero(motor):
+def test_an_index_mark_that_is_stuck_is_no_zero(motor):
     with motor.twin.fault("z_stuck", 0, True):
         motor.carry(-0.5e-3)
         motor.axis.set_parameter("home_method", 34)

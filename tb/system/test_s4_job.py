@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S4's unattended job as experiments.s4_job runs it: small ones, and how it judges them."""
+"""Small unattended jobs of S4, run by experiments.s4_job, and its evaluation of jobs."""
 
 import math
 import random
@@ -25,21 +25,21 @@ SEED = seed()
 NEAR_BY = 0.004  # of a turn: stations 0.7 degree apart
 
 
-def test_amid_trouble_and_through_a_power_cut_of_both_nodes_each_station_is_cut_once():
+def test_with_disturbances_and_a_power_cut_of_both_nodes_each_station_is_cut_once():
     print(f"SEED={SEED}")
     source = random.Random(SEED)
     with IndexingMachine(SEED, "frames", random_worm(source)) as machine:
         machine.load(random_stations(2, source, NEAR_BY))
         outcome = machine.run(Trouble(0.01, 2.0, True, source.uniform(0.5, 4.5), (MAIN, SUB)))
         assert machine.twin.truth(SUB).lost_steps == 0 and machine.table.sensor().frames > 100
-    assert outcome.whole and outcome.worst <= TOLERANCE, (outcome.words, outcome.answers)
+    assert outcome.complete and outcome.worst <= TOLERANCE, (outcome.words, outcome.answers)
     assert outcome.answers and [cut.station for cut in outcome.cuts] == [0, 1]
 
 
 def test_a_list_entered_on_the_panel_is_cut_by_the_bytes_as_printed_after_a_sub_node_power_cut():
     with IndexingMachine(SEED, "legacy") as machine:
         machine.enter(["0.25", "1"])
-        machine.power_cut((SUB,))  # it comes back with its values and the list
+        machine.power_cut((SUB,))  # it starts again with its settings and the station list
         outcome = machine.run()
         peer = machine.table.peer()
     assert not outcome.failed and not outcome.answers and outcome.stations == [900, 3600]
@@ -47,13 +47,13 @@ def test_a_list_entered_on_the_panel_is_cut_by_the_bytes_as_printed_after_a_sub_
     assert outcome.displays["finished"][0].split() == ["all", "cut", "002/002"]
 
 
-# ------------------------------------------------------------------ how it is judged
+# ------------------------------------------------------------------ the evaluation
 
 
 def outcome_of(*cuts, stations=(0.0, 3600.0), state="finished"):
     made = [
-        Cut(station, stations[station] if station is not None else 0.0, 0.0, error, 0.0, whole)
-        for station, error, whole in cuts
+        Cut(station, stations[station] if station is not None else 0.0, 0.0, error, 0.0, complete)
+        for station, error, complete in cuts
     ]
     return Outcome(
         list(stations), made, JobState(state, "ok", len(stations), len(stations), (), ()), 1.0
@@ -61,7 +61,7 @@ def outcome_of(*cuts, stations=(0.0, 3600.0), state="finished"):
 
 
 @pytest.mark.parametrize(
-    "outcome, uncut, twice, strays",
+    "outcome, uncut, twice, outside",
     [
         (outcome_of((0, 0.1, True), (1, -0.4, True)), [], [], 0),
         (outcome_of((0, 0.1, True)), [1], [], 0),
@@ -71,9 +71,9 @@ def outcome_of(*cuts, stations=(0.0, 3600.0), state="finished"):
         (outcome_of((0, 0.1, True), (1, 0.1, True), (None, 900.0, True)), [], [], 1),
     ],
 )
-def test_a_job_is_whole_when_each_station_was_cut_once(outcome, uncut, twice, strays):
-    assert (outcome.uncut, outcome.twice, len(outcome.outside_tolerance)) == (uncut, twice, strays)
-    assert outcome.whole == (not uncut and not twice and not strays)
+def test_a_job_is_complete_when_each_station_was_cut_once(outcome, uncut, twice, outside):
+    assert (outcome.uncut, outcome.twice, len(outcome.outside_tolerance)) == (uncut, twice, outside)
+    assert outcome.complete == (not uncut and not twice and not outside)
 
 
 def test_a_job_fails_beyond_the_tolerance_or_without_an_end():
@@ -83,7 +83,7 @@ def test_a_job_fails_beyond_the_tolerance_or_without_an_end():
     assert outcome_of().worst == math.inf
 
 
-def test_angles_are_apart_the_short_way_round():
+def test_the_difference_of_two_angles_is_the_shorter_one():
     assert apart(1, 1296000 - 1) == 2 and apart(1296000 - 1, 1) == -2 and apart(3600, 3599.5) == 0.5
 
 

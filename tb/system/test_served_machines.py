@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`moire twin --machine` as a program of its own: a client finds and moves the machine of each
+"""`moire twin --machine` as a separate program: a client finds and moves the machine of each
 experiment.
 """
 
@@ -14,12 +14,12 @@ pytestmark = pytest.mark.filterwarnings(
 )  # in pyserial
 
 
-def test_the_machines_that_are_told_are_those_that_are_made():
+def test_the_machines_on_the_page_are_those_that_exist():
     assert list(twin_port.MACHINES) == list(MACHINES)
 
 
 @pytest.mark.parametrize(
-    ("machine", "entrance", "axes", "place", "way", "near_nm"),
+    ("machine", "entrance", "axes", "location", "distance", "near_nm"),
     [
         ("s0_fine", "tcp", {1: 1}, (), "100um", 3),
         ("s2", "rfc2217", {1: 3}, ("--axis", "2"), "200um", 1000),
@@ -27,7 +27,9 @@ def test_the_machines_that_are_told_are_those_that_are_made():
         ("s4", "terminal", {1: 1, 2: 1}, ("--address", "2"), "200um", 1000),
     ],
 )
-def test_every_machine_is_found_and_moved_by_a_client(machine, entrance, axes, place, way, near_nm):
+def test_every_machine_is_found_and_moved_by_a_client(
+    machine, entrance, axes, location, distance, near_nm
+):
     with served("--machine", machine) as ports:
         assert ports["machine"] == machine and ports["nodes"] == list(axes)
         found, _, moved = moire(
@@ -39,11 +41,11 @@ def test_every_machine_is_found_and_moved_by_a_client(machine, entrance, axes, p
             "home",
             "--method",
             "35",
-            *place,
+            *location,
             "--",
             "move",
-            way,
-            *place,
+            distance,
+            *location,
         )
         assert {node["address"]: node["axes"] for node in found["nodes"]} == axes and all(
             node["matches"] for node in found["nodes"]

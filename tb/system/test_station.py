@@ -19,35 +19,13 @@ from moire.client.settings import Settings
 from moire.made.bus_tables import CAUSES, FAULTS
 from tb.bench import seed
 from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, poll, turn_to
+from tb.system.station_node import AXIS, NODE
 from twin import Devices, Twin, TwinTransport, build
-from twin.nodes.twin import Axis, Node, drives
+from twin.nodes.twin import Axis, Node
 
 RECIPE = Path(__file__).resolve().parents[2] / "docs" / "indexing.md"
-SUB, MAIN = 0, 1  # places
+SUB, MAIN = 0, 1  # indices of the nodes in the twin
 ESTOP = next(bit for bit, (name, _) in FAULTS.items() if name == "estop")
-NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
-AXIS = {
-    "period": "1um",
-    "drive": "steps",
-    "position_source": "own_steps",
-    "steps_per_period": 4,
-    "counts_per_period": 4,
-    "disagreement_limit": 0,
-    "encoder_fault_mask": 0,
-    "kp": 0,
-    "ki": 0,
-    "kd": 0,
-    "kv": 0,
-    "ka": 0,
-    "following_limit": "10mm",
-    "velocity": "20mm/s",
-    "acceleration": "100mm/s2",
-    "jerk": "1000mm/s3",
-    "homing_latch_speed": "0.2mm/s",
-    "settle_window": "1um",
-    "settle_time": "5ms",
-    "watchdog_time": "60s",
-}
 QUICK = {
     "turn_allowance": "40arcsec",
     "turn_take_up": "40arcsec",
@@ -80,18 +58,18 @@ class Station:
         )
 
     def beside(self, arcsec):
-        """An angle so far from where the table stands."""
+        """An angle at this distance from the angle of the table."""
         return round(self.table.sensor().angle + arcsec) % TURN
 
     def error(self, target):
         true = math.degrees(self.twin.truth(SUB).position_rad) * 3600
         return (true - target + TURN / 2) % TURN - TURN / 2
 
-    def ask(self, body):
-        """Bodies of what the sub-node answers."""
+    def exchange(self, body):
+        """Send a body to the sub-node; returns the bodies of its answers."""
         self.to_sub.put(frame(body))
         self.twin.run(0.1)
-        return bodies(self.from_sub.take_heard())
+        return bodies(self.from_sub.take_received())
 
 
 @pytest.fixture(scope="module")
@@ -105,8 +83,8 @@ def test_a_target_below_is_reached_from_below_within_two_arcsec_of_the_truth(sta
     target = station.beside(-100)
     state = station.table.turn(target)
     assert abs(state.left) <= 0.5 and abs(station.error(target)) <= 2
-    told = station.twin.truth(SUB)
-    assert told.lost_steps == 0 and told.step_timing_errors == 0
+    truth = station.twin.truth(SUB)
+    assert truth.lost_steps == 0 and truth.step_timing_errors == 0
 
 
 def test_a_frame_from_the_peer_turns_the_table_amid_garbage(station):
@@ -115,36 +93,37 @@ def test_a_frame_from_the_peer_turns_the_table_amid_garbage(station):
     target = station.beside(200)
     station.to_sub.garbage(20)
     assert any(
-        station.ask(turn_to(7, target)) == [bytes([7, OPERATION["turn_to"], 0])] for _ in range(10)
+        station.exchange(turn_to(7, target)) == [bytes([7, OPERATION["turn_to"], 0])]
+        for _ in range(10)
     )
     assert any(
         reply[:3] == bytes([8 + n, OPERATION["turn_state"], 0])
         for n in range(10)
-        for reply in station.ask(poll(8 + n))
+        for reply in station.exchange(poll(8 + n))
     )
     station.to_sub.garbage(0)
     assert station.table.wait().ended == "ok" and abs(station.error(target)) <= 2
     assert station.table.peer().garbage > 0
 
 
-def test_an_emergency_stop_is_told_to_the_peer_and_reset_by_it_when_it_is_over(station):
+def test_an_emergency_stop_is_reported_to_the_peer_and_reset_by_it_when_it_is_over(station):
     station.settings.set("peer_role", "sub")
     station.settings.set("peer_mode", "frames")
     causes = {code: name for code, (name, _) in CAUSES.items()}
 
-    def ask(sequence, operation, fields=b"\0"):
-        reply = station.ask(bytes([sequence, OPERATION[operation]]) + fields)[0]
+    def request(sequence, operation, fields=b"\0"):
+        reply = station.exchange(bytes([sequence, OPERATION[operation]]) + fields)[0]
         return causes[reply[2]], reply[3:]
 
     with station.twin.fault("estop", SUB):
-        station.ask(turn_to(30, station.beside(100)))
-        assert ask(31, "turn_to", b"\0" * 4)[0] == "faulted"
-        cause, fields = ask(32, "status")
+        station.exchange(turn_to(30, station.beside(100)))
+        assert request(31, "turn_to", b"\0" * 4)[0] == "faulted"
+        cause, fields = request(32, "status")
         assert cause == "ok" and int.from_bytes(fields[6:8], "little") == 1 << ESTOP
-        assert ask(33, "reset_faults")[0] == "fault_persists"
-    assert ask(34, "reset_faults")[0] == "ok"
+        assert request(33, "reset_faults")[0] == "fault_persists"
+    assert request(34, "reset_faults")[0] == "ok"
     target = station.beside(100)
-    assert station.ask(turn_to(35, target)) == [bytes([35, OPERATION["turn_to"], 0])]
+    assert station.exchange(turn_to(35, target)) == [bytes([35, OPERATION["turn_to"], 0])]
     assert station.table.wait().ended == "ok" and abs(station.error(target)) <= 2
 
 
@@ -153,18 +132,21 @@ def test_the_bytes_as_printed_turn_the_table_to_its_next_station(station):
     station.settings.set("peer_mode", "legacy")
     target = station.beside(200)
     station.job.load([target])
-    station.from_sub.take_heard()
+    station.from_sub.take_received()
     station.to_sub.put(b"\xff\xff\xaa")
     station.twin.run(0.1)
     assert station.table.peer().phase == "turning" and station.table.wait().ended == "ok"
     station.twin.run(0.01)
     assert (
-        bytes(station.from_sub.take_heard()) == b"\xff\xff\x55" and abs(station.error(target)) <= 2
+        bytes(station.from_sub.take_received()) == b"\xff\xff\x55"
+        and abs(station.error(target)) <= 2
     )
 
 
 class Kept(TwinTransport):
-    """The machine goes on when a call of the command line is over: nothing is closed."""
+    """A transport that stays open when a call of the command line ends, so that the machine goes
+    on.
+    """
 
     def close(self):
         self.twin.run(0.01)
@@ -182,7 +164,7 @@ def test_the_recipe_of_indexing_md_turns_the_table_as_it_is_printed():
         firmware=build.firmware("station"),
         clk_hz=1_840_000,
     ) as twin:
-        twin.set_position(1, math.radians(12.3))  # near, so that the way is short
+        twin.set_position(1, math.radians(12.3))  # near, so that the motion is short
         twin.run(0.1)
         before = twin.truth(1)
         for command in commands:
@@ -190,8 +172,8 @@ def test_the_recipe_of_indexing_md_turns_the_table_as_it_is_printed():
             assert command_line.main(command.split(), lambda options: Kept(twin), out, err) == 0, (
                 err.getvalue()
             )
-        told = twin.truth(1)
-        assert told.steps - before.steps > 3000 and told.lost_steps == 0
-        assert abs(math.degrees(told.position_rad) * 3600 - target) <= 2
+        truth = twin.truth(1)
+        assert truth.steps - before.steps > 3000 and truth.lost_steps == 0
+        assert abs(math.degrees(truth.position_rad) * 3600 - target) <= 2
         axis = Bus(TwinTransport(twin)).axis(2)
         assert axis.get_parameter("deglitch").written() == "10us" and axis.status().faults == ()

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program for the soft core that gives the links' registers to who stands at its peer port: a
-// byte with the number of a register, bit 7 set for a write, then its four bytes, low first; a read
-// is answered with them. Only the node with address 1 answers.
+// A program for the soft core that makes the registers of the peripherals accessible at its peer
+// port: a byte with the number of a register, bit 7 set for a write, then its four bytes, low
+// first; a read is answered with them. Only the node with address 1 answers.
 #include "made/registers.h"
 
 enum { WRITE = 0x80, BIT_TIME = 333 };  // 115200 baud at 2.4 MHz

@@ -31,32 +31,32 @@ def test_phase_is_right_to_a_picometre_over_the_whole_travel(base):
         assert math.hypot(sine, cosine) == pytest.approx(0.85)
 
 
-def reading(stage, place):
-    """What the scale shows at a place, as far from it as a period allows."""
-    sine, cosine = stage.analogue(place)
-    away = math.atan2(sine, cosine) / (2 * math.pi) * PERIOD - place
-    return away - PERIOD * round(away / PERIOD)
+def reading(stage, position):
+    """The error of the scale at a position, modulo a period."""
+    sine, cosine = stage.analogue(position)
+    error = math.atan2(sine, cosine) / (2 * math.pi) * PERIOD - position
+    return error - PERIOD * round(error / PERIOD)
 
 
 def test_the_error_of_the_scale_is_as_stated():
     linear = Stage(**IDEAL, scale_linear=2e-6)
     cyclic = Stage(**IDEAL, scale_cyclic=150e-9, scale_pitch=8e-3)
-    for place in (0, -1e-3, 5e-3, 40e-3, 119e-3):
-        assert reading(linear, place) == pytest.approx(2e-6 * place, abs=1e-12)
-        assert reading(cyclic, place) == pytest.approx(
-            150e-9 * math.sin(2 * math.pi * place / 8e-3), abs=1e-12
+    for position in (0, -1e-3, 5e-3, 40e-3, 119e-3):
+        assert reading(linear, position) == pytest.approx(2e-6 * position, abs=1e-12)
+        assert reading(cyclic, position) == pytest.approx(
+            150e-9 * math.sin(2 * math.pi * position / 8e-3), abs=1e-12
         )
 
 
 def test_the_random_walk_of_a_scale_is_that_of_its_seed_and_begins_at_zero():
     first, again, other = (Stage(seed=seed, **IDEAL, scale_walk=5e-9) for seed in (1, 1, 2))
-    places = [n * 1e-3 for n in range(121)]
-    walk = numpy.array([reading(first, place) for place in places])
+    positions = [n * 1e-3 for n in range(121)]
+    walk = numpy.array([reading(first, position) for position in positions])
     assert walk[0] == pytest.approx(0, abs=1e-12) and 3e-9 < numpy.std(numpy.diff(walk)) < 7e-9
     assert (
         walk.tolist()
-        == [reading(again, place) for place in places]
-        != [reading(other, place) for place in places]
+        == [reading(again, position) for position in positions]
+        != [reading(other, position) for position in positions]
     )
     assert reading(first, 20.5e-3) == pytest.approx((walk[20] + walk[21]) / 2, abs=1e-12)
 
@@ -82,7 +82,7 @@ def test_offset_gain_and_phase_error_are_as_stated():
 
 
 def vector(stage, count=64):
-    """cos + i sin, of an amplitude of 1, at so many points of a period."""
+    """cos + i sin with an amplitude of 1, at equally spaced points of a period."""
     points = numpy.array([stage.analogue(n / count * PERIOD) for n in range(count)]) / 0.85
     return points[:, 1] + 1j * points[:, 0]
 
@@ -92,9 +92,9 @@ def test_a_harmonic_of_the_vector_is_that_one_and_no_other(harmonic):
     stage = Stage(
         **IDEAL, **{f"harmonic_{'plus' if harmonic > 0 else 'minus'}_{abs(harmonic)}": 0.01}
     )
-    wanted = numpy.zeros(64)
-    wanted[1], wanted[harmonic] = 1, 0.01
-    assert numpy.abs(numpy.fft.fft(vector(stage)) / 64 - wanted).max() < 1e-9
+    expected = numpy.zeros(64)
+    expected[1], expected[harmonic] = 1, 0.01
+    assert numpy.abs(numpy.fft.fft(vector(stage)) / 64 - expected).max() < 1e-9
 
 
 def test_harmonics_come_before_gain_phase_and_offset_as_the_figures_take_them():
@@ -124,7 +124,7 @@ def test_noise_is_half_a_count_before_the_conversion():
     assert abs(numpy.corrcoef(codes.T)[0, 1]) < 0.03
 
 
-def test_sample_spikes_come_as_often_as_asked():
+def test_sample_spikes_come_at_the_given_rate():
     stage = Stage(**{**IDEAL, "signal_spike_share": 0.05})
     codes = numpy.array([stage.convert(0.0)[0] for _ in range(20000)])
     assert (
@@ -144,7 +144,7 @@ def test_a_frame_is_two_zeros_the_word_and_zeros(bits):
         assert ["".join(str(bits[k]) for bits in frame) for k in (0, 1)] == expected
 
 
-def test_both_channels_are_sampled_at_the_same_place():
+def test_both_channels_are_sampled_at_the_same_position():
     stage = Stage(**IDEAL)
     frame = stage.frame(0.1e-6, 10)
     words = [int("".join(str(bits[k]) for bits in frame), 2) for k in (0, 1)]
@@ -152,13 +152,13 @@ def test_both_channels_are_sampled_at_the_same_place():
 
 
 def count(a, b):
-    """x4 count of two levels, A leading B counts up; and the largest number of channels that
+    """The x4 count of two levels, up when A leads B, and the largest number of channels that
     changed at once.
     """
-    place = (
+    position = (
         b.astype(int) << 1 | (a ^ b)
     ) & 3  # quarter of the period: 00 10 11 01 of a, b are 0 1 2 3
-    steps = numpy.diff(place)
+    steps = numpy.diff(position)
     steps = (steps + 1) % 4 - 1
     return steps.sum(), numpy.abs(steps).max()
 
@@ -188,7 +188,7 @@ def test_comparators_have_hysteresis():
 
 def test_spikes_are_short_and_as_frequent_as_stated():
     stage = Stage(**{**IDEAL, "comparator_spike_rate": 500})
-    for level in stage.levels(1.0, PERIOD / 8, 0.0):  # standing between two edges
+    for level in stage.levels(1.0, PERIOD / 8, 0.0):  # at rest between two edges
         edges = numpy.flatnonzero(numpy.diff(level.astype(int)))
         widths = edges[1::2] - edges[::2]
         assert 400 < len(widths) < 600

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The linear motor of S3, driven by frames to its converter, against what can be worked out by
-hand.
-"""
+"""The linear motor of S3, driven by frames to its DAC, compared with calculations by hand."""
 
 import math
 
@@ -12,7 +10,7 @@ from twin import Machine
 from twin.parameters import tables as parameters
 
 FREE = dict(guide_coulomb=1e-9, guide_static=1e-9, guide_viscous=0, guide_presliding_damping=0)
-AMPERE = 0.3 * 10 / 32768  # a count of the converter
+AMPERE = 0.3 * 10 / 32768  # an LSB of the DAC
 
 
 def motor(clk_hz=1_000_000, **values):
@@ -73,8 +71,8 @@ def test_it_swings_on_flexure_and_cable_without_losing_energy():
     machine.trace(10_000)
     machine.run(6.0)
     trace = machine.take_trace()
-    rest = 40 * 3e-3 / 140
-    x, v = trace["position_m"] - rest, trace["velocity_m_s"]
+    equilibrium = 40 * 3e-3 / 140
+    x, v = trace["position_m"] - equilibrium, trace["velocity_m_s"]
     energy = 140 * x**2 / 2 + 1.2 * v**2 / 2
     assert numpy.abs(energy / energy[0] - 1).max() < 1e-3
     rises = trace["time_s"][1:][(x[:-1] < 0) & (x[1:] >= 0)]
@@ -84,16 +82,16 @@ def test_it_swings_on_flexure_and_cable_without_losing_energy():
 
 
 def test_it_rests_anywhere_within_a_millimetre_and_stays_there():
-    places = []
+    positions = []
     for seed in range(20):
         machine = Machine("linear_motor", seed=seed, clk_hz=100_000)
-        places.append(machine.state.position_m)
+        positions.append(machine.state.position_m)
         machine.run(1.0)
-        assert machine.state.position_m == pytest.approx(places[-1], abs=1e-8)
+        assert machine.state.position_m == pytest.approx(positions[-1], abs=1e-8)
     assert (
-        all(-1e-3 <= place <= 1e-3 for place in places)
-        and len(set(places)) == 20
-        and min(places) < 0 < max(places)
+        all(-1e-3 <= position <= 1e-3 for position in positions)
+        and len(set(positions)) == 20
+        and min(positions) < 0 < max(positions)
     )
     p = parameters.values(machine="linear_motor")
     assert (
@@ -125,7 +123,7 @@ def test_the_mark_is_a_count_wide_and_scatters_as_stated():
         inside = trace["position_m"][trace["z"] > 0]
         lows.append(inside.min())
         highs.append(inside.max())
-    slack = 0.05e-6 + 0.011e-6  # scatter, and a trace step
+    slack = 0.05e-6 + 0.011e-6  # scatter plus a step of the trace
     assert all(abs(low - 0.25e-6) <= slack for low in lows) and all(
         abs(high - 1.25e-6) <= slack for high in highs
     )
@@ -145,7 +143,7 @@ def test_the_scale_counts_every_micrometre_both_ways():
         total += steps.sum()
     assert (
         abs(total - (machine.state.scale_counts - start)) <= 2
-    )  # an edge may lie between two watches
+    )  # an edge may be between two calls of watch
     machine.set_position(-3e-3)
     machine.run(1e-4)
     assert machine.state.scale_counts in (-3001, -3000)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The panel of S4: EEPROM, key-pad and character display on one I2C bus, numeric display; driven by
-an I2C master made of pins.
+an I2C master that sets the pins.
 """
 
 import random
@@ -19,8 +19,8 @@ PANEL = Devices(eeprom=True, keypad=True, display=True)
 
 
 class Master:
-    """I2C by pins; a quarter of a bit is the unit. `recorded`: levels of scl and sda, a quarter
-    each.
+    """An I2C master on pins, in units of a quarter bit. `recorded` has the levels of scl and sda in
+    each quarter.
     """
 
     def __init__(self, bench):
@@ -65,14 +65,14 @@ class Master:
         return byte
 
     def send(self, address, data=()):
-        """A whole write; False at the first byte that is not acknowledged."""
+        """A complete write; returns False at the first byte that is not acknowledged."""
         self.start()
         good = all(self.write(byte) for byte in (address << 1, *data))
         self.stop()
         return good
 
     def fetch(self, address, count, at=()):
-        """Bytes from the address, after a write of `at`; None if nobody answers."""
+        """Read bytes from the device after a write of `at`; None if no device answers."""
         self.start()
         if at:
             if not all(self.write(byte) for byte in (address << 1, *at)):
@@ -97,7 +97,7 @@ def master(panel):
     return Master(panel)
 
 
-def place(address):
+def address_bytes(address):
     return [address >> 8, address & 0xFF]
 
 
@@ -106,22 +106,22 @@ def place(address):
 
 def test_what_is_written_is_read_after_the_write_time(panel, master):
     data = [random.randrange(256) for _ in range(64)]
-    assert master.send(EEPROM, [*place(0x1240), *data])
+    assert master.send(EEPROM, [*address_bytes(0x1240), *data])
     assert not master.send(EEPROM)  # busy
     panel.run(4.5e-3)
     assert not master.send(EEPROM)
     panel.run(0.5e-3)
-    assert master.fetch(EEPROM, 64, place(0x1240)) == data
+    assert master.fetch(EEPROM, 64, address_bytes(0x1240)) == data
     assert panel.eeprom[0x1240:0x1280] == bytes(data) and panel.state.eeprom_writes == 1
 
 
 def test_a_write_rolls_over_in_its_page(panel, master):
-    assert master.send(EEPROM, [*place(0x007E), 1, 2, 3, 4])
+    assert master.send(EEPROM, [*address_bytes(0x007E), 1, 2, 3, 4])
     panel.run(5e-3)
     assert panel.eeprom[0x40:0x42] == bytes([3, 4]) and panel.eeprom[0x7E:0x82] == bytes(
         [1, 2, 0xFF, 0xFF]
     )
-    assert master.send(EEPROM, [*place(0x0000), *range(70)])  # the last 6 over the first
+    assert master.send(EEPROM, [*address_bytes(0x0000), *range(70)])  # the last 6 over the first
     panel.run(5e-3)
     assert panel.eeprom[:0x40] == bytes([64, 65, 66, 67, 68, 69, *range(6, 64)])
 
@@ -129,16 +129,19 @@ def test_a_write_rolls_over_in_its_page(panel, master):
 def test_reading_goes_on_over_pages_and_the_end(panel, master):
     panel.write_eeprom(0x3FFE, [5, 6])
     panel.write_eeprom(0, [7, 8])
-    assert master.fetch(EEPROM, 4, place(0x3FFE)) == [5, 6, 7, 8]
-    assert master.fetch(EEPROM, 1) == [0xFF]  # from where it stands
-    assert master.fetch(EEPROM, 2, place(0xC000)) == [7, 8]  # the two highest bits do not matter
+    assert master.fetch(EEPROM, 4, address_bytes(0x3FFE)) == [5, 6, 7, 8]
+    assert master.fetch(EEPROM, 1) == [0xFF]  # from the address pointer
+    assert master.fetch(EEPROM, 2, address_bytes(0xC000)) == [
+        7,
+        8,
+    ]  # the two highest bits do not matter
 
 
 def test_without_a_stop_after_a_whole_byte_nothing_is_written(panel, master):
     master.start()
     for byte in (EEPROM << 1, 0, 0, 0x55):
         assert master.write(byte)
-    assert master.fetch(EEPROM, 1, place(0)) == [0xFF]  # a start instead
+    assert master.fetch(EEPROM, 1, address_bytes(0)) == [0xFF]  # a start instead of a stop
     master.start()
     for byte in (EEPROM << 1, 0, 0, 0x55):
         assert master.write(byte)
@@ -146,7 +149,9 @@ def test_without_a_stop_after_a_whole_byte_nothing_is_written(panel, master):
         master.bit(level)
     master.stop()  # in the middle of a byte
     assert panel.state.eeprom_writes == 0 and panel.eeprom == b"\xff" * 16384
-    assert master.send(EEPROM, place(5)) and panel.state.eeprom_writes == 0  # an address alone
+    assert (
+        master.send(EEPROM, address_bytes(5)) and panel.state.eeprom_writes == 0
+    )  # only the address
 
 
 def test_a_power_cut_while_it_writes_tears_the_page_and_no_other(panel, master):
@@ -154,7 +159,7 @@ def test_a_power_cut_while_it_writes_tears_the_page_and_no_other(panel, master):
     counts = {"old": 0, "new": 0, "neither": 0}
     for _ in range(20):
         panel.write_eeprom(0x80, old)
-        assert master.send(EEPROM, [*place(0x80), *new])
+        assert master.send(EEPROM, [*address_bytes(0x80), *new])
         panel.run(random.uniform(0.1e-3, 4.9e-3))
         panel.power_cut()
         panel.run(1e-3)
@@ -162,16 +167,16 @@ def test_a_power_cut_while_it_writes_tears_the_page_and_no_other(panel, master):
         assert panel.eeprom[:0x80] == b"\xff" * 0x80 and panel.eeprom[0xC0:] == b"\xff" * (
             16384 - 0xC0
         )
-        for byte, was, wanted in zip(panel.eeprom[0x80:0xC0], old, new + old[32:]):
-            counts["old" if byte == was else "new" if byte == wanted else "neither"] += 1
-        assert master.fetch(EEPROM, 64, place(0x80)) == list(
+        for byte, was, expected in zip(panel.eeprom[0x80:0xC0], old, new + old[32:]):
+            counts["old" if byte == was else "new" if byte == expected else "neither"] += 1
+        assert master.fetch(EEPROM, 64, address_bytes(0x80)) == list(
             panel.eeprom[0x80:0xC0]
-        )  # ready, and sure of what it has
+        )  # the write time is over, so the contents are safe
     assert panel.state.eeprom_torn == 20 and min(counts.values()) > 150, counts
 
 
 def test_a_power_cut_at_rest_changes_nothing(panel, master):
-    assert master.send(EEPROM, [*place(0x100), 1, 2, 3])
+    assert master.send(EEPROM, [*address_bytes(0x100), 1, 2, 3])
     panel.run(5e-3)
     before = panel.eeprom
     panel.power_cut()
@@ -210,14 +215,14 @@ def test_every_key_has_its_event(panel, master):
 def test_events_wait_in_order_and_the_flag_stays_until_all_are_read(panel, master):
     set_up(master)
     panel.press(0), panel.press(15), panel.release(0)
-    panel.press(15)  # it is down: no event
+    panel.press(15)  # the key is already down: no event
     assert read(master, INT_STAT) == 1 and read(master, COUNT) == 3
     assert master.send(KEYPAD, [INT_STAT, 1]) and read(master, INT_STAT) == 1
     assert [read(master, EVENT) for _ in range(3)] == [0x81, 0x80 | 22, 0x01]
     assert master.send(KEYPAD, [INT_STAT, 1]) and read(master, INT_STAT) == 0
 
 
-def test_the_eleventh_event_is_lost_or_the_first_and_said_so(panel, master):
+def test_the_eleventh_event_or_the_first_is_lost_and_reported(panel, master):
     for cfg, first, last in ((0x01, 0x81, 0x01 + 4), (0x21, 0x01, 0x80 | 0x01 + 5)):
         set_up(master, cfg)
         for key in range(5):
@@ -240,7 +245,7 @@ def test_keys_that_are_not_switched_to_the_pad_make_no_event(panel, master):
     assert read(master, COUNT) == 1 and read(master, EVENT) == 0x82
 
 
-def test_registers_are_read_in_a_row_if_told_so(panel, master):
+def test_registers_are_read_in_a_row_if_enabled(panel, master):
     set_up(master, 0x81)
     assert master.fetch(KEYPAD, 2, [ROWS]) == [0x1F, 0x7F]
     set_up(master)
@@ -261,7 +266,7 @@ RS, RW, E, LIGHT = 1, 2, 4, 8
 
 
 class Screen:
-    """As firmware drives it: 4 bits at a time."""
+    """The display as the firmware drives it: 4 bits at a time."""
 
     def __init__(self, master):
         self.master = master
@@ -438,7 +443,7 @@ def test_devices_that_are_absent_or_dead_do_not_answer(panel, master):
         assert master.send(address)
     other = DevicesBench(Devices(keypad=True))
     assert not Master(other).send(EEPROM) and Master(other).send(KEYPAD)
-    other.clear("eeprom_dead")  # what is not there does not come back
+    other.clear("eeprom_dead")  # a device that was not built stays absent
     assert not Master(other).send(EEPROM)
 
 
@@ -492,9 +497,9 @@ needs_sigrok = pytest.mark.skipif(
 def test_sigrok_reads_the_same_from_the_bus(panel, master, tmp_path):
     master.recorded = []
     data = [0xDE, 0xAD, 0xBE, 0xEF]
-    assert master.send(EEPROM, [*place(0x0123), *data])
+    assert master.send(EEPROM, [*address_bytes(0x0123), *data])
     panel.run(5e-3)
-    assert master.fetch(EEPROM, 4, place(0x0123)) == data
+    assert master.fetch(EEPROM, 4, address_bytes(0x0123)) == data
     out = decoded(
         master.recorded,
         4 * BUS_HZ,

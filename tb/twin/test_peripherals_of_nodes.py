@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The links of nodes in the twin, pin by pin: the RTL between a program that hands its registers
-out and what stands around it.
+"""The peripherals of nodes in the twin, pin by pin: the RTL is between a program that makes its
+registers accessible and the models of the devices.
 """
 
 import math
@@ -23,7 +23,7 @@ EEPROM, KEYPAD, DISPLAY = 0x50, 0x34, 0x27
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
-    """Words of peripherals_bridge.c, made by the firmware's own firmware_build."""
+    """Words of peripherals_bridge.c, made by firmware.build."""
     folder, memory = tmp_path_factory.mktemp("program"), 4 * 4096
     command, libraries = firmware_build.compiler()
     script, elf = folder / "link.ld", folder / "bridge.elf"
@@ -51,7 +51,7 @@ def program(tmp_path_factory):
 
 
 class Bridge:
-    """The links' registers of the first node, over its peer port."""
+    """The registers of the peripherals of the first node, accessed over its peer port."""
 
     def __init__(self, twin):
         self.twin, self.to, self.back = twin, twin.peer_line(1, 0), twin.peer_line(0, 1)
@@ -71,7 +71,7 @@ class Bridge:
     def word(self, number):
         self.to.put([number])
         self._wait(5)
-        return int.from_bytes(self.back.take_heard(), "little")
+        return int.from_bytes(self.back.take_received(), "little")
 
     def read(self, register, name="value"):
         field = BY_NAME["peripherals", register, name]
@@ -80,7 +80,7 @@ class Bridge:
     # I2C by the queue of commands
 
     def i2c(self, *commands):
-        """Answers (result, data) to commands (command, data, acknowledge)."""
+        """Execute commands (command, data, acknowledge); returns their (result, data)."""
         for command, data, acknowledge in commands:
             self.write("i2c", command=command, data=data, acknowledge=acknowledge)
         while self.read("i2c_state", "busy"):
@@ -110,7 +110,7 @@ class Bridge:
 
 @pytest.fixture
 def twin(program):
-    around = Devices(
+    devices = Devices(
         eeprom=True,
         keypad=True,
         display=True,
@@ -120,7 +120,7 @@ def twin(program):
         parameters={"edm_cut_time": CUT_S, "eeprom_write_time": WRITE_S},
     )
     with Twin(
-        [Node(1, [Axis("worm_table")], around), Node(2, [])],
+        [Node(1, [Axis("worm_table")], devices), Node(2, [])],
         firmware=program,
         peers=(0, 1),
         peer_baud=BRIDGE_BAUD,
@@ -129,20 +129,22 @@ def twin(program):
 
 
 @pytest.fixture
-def links(twin):
+def peripherals(twin):
     return Bridge(twin)
 
 
-def test_the_panel_is_reached_by_the_bus(twin, links):
+def test_the_panel_is_reached_by_the_bus(twin, peripherals):
     panel = twin.devices(0)
-    assert links.send(EEPROM, 0x01, 0x20, 1, 2, 3) and not links.send(EEPROM)  # it writes
+    assert peripherals.send(EEPROM, 0x01, 0x20, 1, 2, 3) and not peripherals.send(
+        EEPROM
+    )  # it writes
     twin.run(WRITE_S)
-    assert links.fetch(EEPROM, 3, 0x01, 0x20) == [1, 2, 3] and panel.eeprom[0x120:0x123] == bytes(
-        [1, 2, 3]
-    )
-    assert links.send(KEYPAD, 0x1D, 0x1F) and links.send(KEYPAD, 0x1E, 0x7F)
+    assert peripherals.fetch(EEPROM, 3, 0x01, 0x20) == [1, 2, 3] and panel.eeprom[
+        0x120:0x123
+    ] == bytes([1, 2, 3])
+    assert peripherals.send(KEYPAD, 0x1D, 0x1F) and peripherals.send(KEYPAD, 0x1E, 0x7F)
     panel.press(8)
-    assert links.fetch(KEYPAD, 1, 0x04) == [0x80 | 12]
+    assert peripherals.fetch(KEYPAD, 1, 0x04) == [0x80 | 12]
     for nibble, register in (
         (3, 0),
         (3, 0),
@@ -157,60 +159,64 @@ def test_the_panel_is_reached_by_the_bus(twin, links):
         (6, 1),
         (9, 1),
     ):
-        links.send(DISPLAY, nibble << 4 | 12 | register, nibble << 4 | 8 | register)
+        peripherals.send(DISPLAY, nibble << 4 | 12 | register, nibble << 4 | 8 | register)
         twin.run(5e-3)
     assert panel.lines[0] == "Hi" + " " * 18
     with panel.fault("eeprom_dead"):
-        assert not links.send(EEPROM)
+        assert not peripherals.send(EEPROM)
     with panel.fault("sda_low"):
         twin.run(1e-3)
-        assert links.read("i2c_state", "sda") == 0
+        assert peripherals.read("i2c_state", "sda") == 0
 
 
-def test_the_numeric_display_shows_what_is_sent(twin, links):
+def test_the_numeric_display_shows_what_is_sent(twin, peripherals):
     for word in (0x0C01, 0x0B07, 0x09FF, 0x0104, 0x0283):
-        links.write("display", value=word)
+        peripherals.write("display", value=word)
     twin.run(5e-3)
     assert twin.devices(0).digits == "0" * 6 + "3.4"
 
 
-def test_keys_pass_both_ways_and_a_cut_is_injected(twin, links):
-    around = twin.devices(0)
-    around.type([0x1C, 0xF0, 0x1C])
-    around.order([0xED, 0x04])
+def test_keys_pass_both_ways_and_a_cut_is_injected(twin, peripherals):
+    devices = twin.devices(0)
+    devices.type([0x1C, 0xF0, 0x1C])
+    devices.order([0xED, 0x04])
     twin.run(0.1)
-    assert [byte for _, byte in around.take_heard() if byte != 0xFA] == [
+    assert [byte for _, byte in devices.take_received() if byte != 0xFA] == [
         0x1C,
         0xF0,
         0x1C,
-    ] and around.state.keyboard_lights == 4
-    assert links.read("ps2_typed") == 3
-    links.write("ps2_idle", value=20)
+    ] and devices.state.keyboard_lights == 4
+    assert peripherals.read("ps2_typed") == 3
+    peripherals.write("ps2_idle", value=20)
     for n, code in enumerate(START):
-        links.write("ps2_inject", data=code, last=n == 5)
-    around.type([0x2A, 0xF0, 0x2A])
+        peripherals.write("ps2_inject", data=code, last=n == 5)
+    devices.type([0x2A, 0xF0, 0x2A])
     twin.run(0.2)
-    heard = [byte for _, byte in around.take_heard()]
-    assert sorted(heard) == sorted([*START, 0x2A, 0xF0, 0x2A]) and around.state.edm_cutting
-    assert links.read("edm_status", "inputs") == 1 and links.read("edm_status", "rose_0")
+    received = [byte for _, byte in devices.take_received()]
+    assert sorted(received) == sorted([*START, 0x2A, 0xF0, 0x2A]) and devices.state.edm_cutting
+    assert peripherals.read("edm_status", "inputs") == 1 and peripherals.read(
+        "edm_status", "rose_0"
+    )
     twin.run(CUT_S)
-    (cut,) = around.cuts
-    assert cut.whole and cut.angle_start_rad == pytest.approx(
+    (cut,) = devices.cuts
+    assert cut.complete and cut.angle_start_rad == pytest.approx(
         twin.truth(0).position_rad, abs=ARC_SECOND
     )
-    assert links.read("edm_status", "inputs") == 0 and links.read("edm_status", "fell_0")
-    with around.fault("edm_alarm"):
+    assert peripherals.read("edm_status", "inputs") == 0 and peripherals.read(
+        "edm_status", "fell_0"
+    )
+    with devices.fault("edm_alarm"):
         twin.run(0.05)
-        assert links.read("edm_status", "inputs") == 2
+        assert peripherals.read("edm_status", "inputs") == 2
 
 
-def test_the_sensor_of_the_first_axis_is_read(twin, links):
-    links.write("sensor_bit_time", value=333)
-    links.write("sensor_gap", value=2_000)
+def test_the_sensor_of_the_first_axis_is_read(twin, peripherals):
+    peripherals.write("sensor_bit_time", value=333)
+    peripherals.write("sensor_gap", value=2_000)
     twin.run(0.1)
-    assert links.read("sensor_frames") >= 9 and links.read("sensor_state", "stale") == 0
+    assert peripherals.read("sensor_frames") >= 9 and peripherals.read("sensor_state", "stale") == 0
     angle = (
-        links.word(BY_NAME["peripherals", "sensor_reading", "value"].offset // 4)
+        peripherals.word(BY_NAME["peripherals", "sensor_reading", "value"].offset // 4)
         / 2**32
         * 2
         * math.pi
@@ -220,38 +226,39 @@ def test_the_sensor_of_the_first_axis_is_read(twin, links):
     )
 
 
-def test_a_power_cut_stops_the_program_and_tears_the_page_it_wrote(twin, links):
-    around = twin.devices(0)
-    around.write_eeprom(0, [0x11] * 128)
-    links.write("sensor_gap", value=2_000)
-    around.type(START)
+def test_a_power_cut_stops_the_program_and_tears_the_page_it_wrote(twin, peripherals):
+    devices = twin.devices(0)
+    devices.write_eeprom(0, [0x11] * 128)
+    peripherals.write("sensor_gap", value=2_000)
+    devices.type(START)
     twin.run(0.1)
-    assert links.send(EEPROM, 0, 0, *[0x22] * 8)
+    assert peripherals.send(EEPROM, 0, 0, *[0x22] * 8)
     twin.power_cut(0)
-    torn = around.eeprom
+    interrupted = devices.eeprom
     twin.run(0.05)
     assert (
-        links.back.take_heard() == b""
-        and around.state.edm_cutting
-        and around.state.eeprom_torn == 1
+        peripherals.back.take_received() == b""
+        and devices.state.edm_cutting
+        and devices.state.eeprom_torn == 1
     )
-    assert torn[:64] not in (bytes([0x22] * 8 + [0x11] * 56), bytes([0x11] * 64)) and torn[
-        64:128
-    ] == bytes([0x11] * 64)
-    around.type([0x1C])
+    assert interrupted[:64] not in (
+        bytes([0x22] * 8 + [0x11] * 56),
+        bytes([0x11] * 64),
+    ) and interrupted[64:128] == bytes([0x11] * 64)
+    devices.type([0x1C])
     twin.run(0.05)
     assert (
-        not [byte for _, byte in around.take_heard() if byte == 0x1C]
-        and around.state.keyboard_sent == 7
+        not [byte for _, byte in devices.take_received() if byte == 0x1C]
+        and devices.state.keyboard_sent == 7
     )
     twin.power_on(0)
     twin.run(2e-3)
-    assert links.read("sensor_gap") != 2_000 and around.eeprom == torn
+    assert peripherals.read("sensor_gap") != 2_000 and devices.eeprom == interrupted
     twin.run(CUT_S)
-    assert [cut.whole for cut in around.cuts] == [True]
+    assert [cut.complete for cut in devices.cuts] == [True]
 
 
-def test_a_node_without_power_is_silent_its_drive_off_and_it_starts_afresh():
+def test_a_node_without_power_is_silent_with_its_drive_off_and_it_restarts():
     with Twin(seed=1) as twin:
         twin.run(0.1)
         bus = Bus(TwinTransport(twin))
@@ -281,7 +288,7 @@ def test_a_node_without_power_is_silent_its_drive_off_and_it_starts_afresh():
         assert axis.status().position_nm is not None and twin.bus().collisions == 0
 
 
-def test_surroundings_and_peers_that_are_not_there_are_refused():
+def test_devices_and_peers_that_do_not_exist_are_refused():
     with Twin(seed=1) as twin:
         with pytest.raises(LookupError, match="no node has devices"):
             twin.devices(0)

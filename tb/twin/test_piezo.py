@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fine stage on the table, driven by frames to its converter, against what can be worked out by
-hand.
-"""
+"""The fine stage on the table, driven by frames to its DAC, compared with calculations by hand."""
 
 import math
 
@@ -39,28 +37,28 @@ def test_the_full_loop_is_the_range_and_its_middle_is_as_wide_as_stated():
 
 
 def test_a_small_loop_is_narrow_and_hardly_moves_the_branch():
-    """Within the smallest of the plays (1/11 of the swing) there is no hysteresis at all."""
+    """Within the smallest play (1/11 of the swing) there is no hysteresis."""
     stage = fine_stage(**STILL)
     go(stage, 50000)
-    places = [go(stage, 50000 - n) for n in (0, 2000, 4000, 2000, 0)]
+    positions = [go(stage, 50000 - n) for n in (0, 2000, 4000, 2000, 0)]
     assert (
-        places[0] - places[1] == pytest.approx(places[1] - places[2], rel=1e-6)
-        and places[1] < places[0]
+        positions[0] - positions[1] == pytest.approx(positions[1] - positions[2], rel=1e-6)
+        and positions[1] < positions[0]
     )
-    assert places[3:] == pytest.approx(places[1::-1], abs=1e-13)
+    assert positions[3:] == pytest.approx(positions[1::-1], abs=1e-13)
 
 
-def test_it_creeps_by_its_share_in_each_decade_of_time():
+def test_it_creeps_by_its_fraction_in_each_decade_of_time():
     stage = fine_stage(**DAMPED)
     go(stage, 65535, 0.0)
     stage.run(0.1)
-    places = []
+    positions = []
     for seconds in (0.0, 0.9, 9.0):
         stage.run(seconds)
-        places.append(stage.state.piezo_m)
-    way = places[0]
-    assert (places[1] - places[0]) / way == pytest.approx(0.015, rel=0.1)
-    assert (places[2] - places[1]) / way == pytest.approx(0.015, rel=0.1)
+        positions.append(stage.state.piezo_m)
+    first = positions[0]
+    assert (positions[1] - positions[0]) / first == pytest.approx(0.015, rel=0.1)
+    assert (positions[2] - positions[1]) / first == pytest.approx(0.015, rel=0.1)
 
 
 def test_the_amplifier_slews():

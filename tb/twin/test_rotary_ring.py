@@ -12,7 +12,7 @@ ANGLES = numpy.arange(36_000) / 36_000 * TURN
 
 
 def error(ring):
-    """arcsec over a turn, without what changes with time"""
+    """The error over a turn in arcsec, without the drift."""
     return (
         ring.measured(ANGLES) - ring.measured(ANGLES[0]) + ring.measured(0.0) - ANGLES
     ) / ARC_SECOND
@@ -63,10 +63,10 @@ def test_a_turn_has_an_edge_a_count_and_one_index(subdivision):
     assert ring.counts_per_turn == counts
     angles = numpy.linspace(0.1, 0.1 + TURN, 16 * counts)
     levels = ring.levels(angles)
-    for way in (1, -1):
-        a, b, z = (levels[::way] >> n & 1 for n in range(3))
+    for direction in (1, -1):
+        a, b, z = (levels[::direction] >> n & 1 for n in range(3))
         steps = (numpy.diff((b << 1 | (a ^ b)).astype(int)) + 1) % 4 - 1
-        assert abs(steps).max() == 1 and steps.sum() == pytest.approx(way * counts, abs=1)
+        assert abs(steps).max() == 1 and steps.sum() == pytest.approx(direction * counts, abs=1)
         assert (numpy.diff(z.astype(int)) == 1).sum() == 1
 
 
@@ -78,6 +78,6 @@ def test_the_index_lies_on_the_measured_scale():
     assert 1000 <= counts.min() < 1000.1 and 1000.9 < counts.max() <= 1001
 
 
-def test_a_ring_is_another_by_its_seed_and_the_same_again():
+def test_a_ring_depends_on_its_seed_only():
     assert (RotaryRing(1).measured(ANGLES) == RotaryRing(1).measured(ANGLES)).all()
     assert (RotaryRing(1).measured(ANGLES) != RotaryRing(2).measured(ANGLES)).any()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plant alone, against what can be worked out by hand."""
+"""The plant alone, compared with calculations by hand."""
 
 import math
 
@@ -32,7 +32,7 @@ def test_every_parameter_has_a_unit_and_a_reason():
 
 
 def steady_speed(stage, voltage):
-    """rad/s at which the motor's torque equals all friction."""
+    """The speed in rad/s at which the torque of the motor equals the friction."""
     p = stage.plant
     torque = p["motor_coulomb"] + LEAD * p["table_coulomb"]
     per_speed = p["motor_viscous"] + LEAD**2 * p["table_viscous"]
@@ -102,25 +102,27 @@ def test_stiction_of_the_motor_holds_below_break_away_and_never_creeps():
         < p["motor_static"]
         < torque[2] - LEAD * p["table_static"]
     )
-    for on, creep in (
+    for on, limit in (
         (2, 1e-12),
         (3, 1e-9),
     ):  # the ripple of the PWM may work on it close to break-away
         stage.bridge(0.2, on / stage.PERIOD)
         there = stage.state.position_m
         stage.bridge(1.0, on / stage.PERIOD)
-        assert abs(stage.state.position_m - there) < creep
-        assert there - 20e-3 < 1e-6  # wound up, not slid
+        assert abs(stage.state.position_m - there) < limit
+        assert there - 20e-3 < 1e-6  # the transmission is elastic, nothing slid
     stage.bridge(0.2, 5 / stage.PERIOD)
     assert stage.state.position_m - there > 5e-6
 
 
 def test_stiction_of_the_table_is_a_spring_that_lets_go_at_break_away():
-    stage = Stage(screw_stiffness=1.0, screw_damping=0, screw_preload=0)  # as good as no screw
+    stage = Stage(
+        screw_stiffness=1.0, screw_damping=0, screw_preload=0
+    )  # the screw has almost no stiffness
     stage.set_position(20e-3)
     p, start = stage.plant, stage.state.position_m
 
-    def ramp(begin, end):  # slowly: a step would overshoot
+    def ramp(begin, end):  # slowly, since a step would overshoot
         for n in range(1, 21):
             stage.push((begin + (end - begin) * n / 20) * p["table_coulomb"])
             stage.bridge(0.02)
@@ -160,7 +162,7 @@ def test_friction_is_stable_at_any_speed():
 
 
 def push_both_ways(stage, newton):
-    """How far the table goes between a push up and a push down, m; the rotor is held."""
+    """Distance in m of the table between a push up and a push down; the rotor is held."""
     stage.set_position(20e-3)
     stage.hold(rotor=True)
     ends = []
@@ -171,7 +173,7 @@ def push_both_ways(stage, newton):
     return ends[0] - ends[1]
 
 
-def test_the_backlash_is_as_wide_as_the_parameter_says():
+def test_the_backlash_equals_its_parameter():
     calm = {**SMOOTH, "table_viscous": 2000.0}
     for backlash in (0, 0.4e-6, 1e-6):
         stage = Stage(screw_preload=0, screw_backlash=backlash, **calm)
@@ -205,11 +207,11 @@ def test_the_table_rings_on_the_screw_with_its_natural_frequency_and_damping():
     stage.push(10)
     stage.bridge(0.1)
     stage.push(0)
-    rest, dt = 20e-3, p["time_step"]
+    equilibrium, dt = 20e-3, p["time_step"]
     trace = []
     for _ in range(1000):
         stage.bridge(dt)
-        trace.append(stage.state.position_m - rest)
+        trace.append(stage.state.position_m - equilibrium)
     rises = [
         n + trace[n] / (trace[n] - trace[n + 1])
         for n in range(len(trace) - 1)
@@ -225,30 +227,33 @@ def test_the_table_rings_on_the_screw_with_its_natural_frequency_and_damping():
 
 
 def actuations(seed, end, cycles=6):
-    """Places where a switch presses and releases, driven slowly over its edge."""
+    """Positions at which a switch presses and releases, driven slowly over its edge."""
     stage = Stage(seed=seed)
     outward = -1 if end == "low" else 1
     stage.set_position(stage.plant[f"switch_{end}"] - outward * 1e-6)
     presses, releases = [], []
     for _ in range(cycles):
-        for places, way, wanted in ((presses, outward, True), (releases, -outward, False)):
+        for positions, direction, pressed in (
+            (presses, outward, True),
+            (releases, -outward, False),
+        ):
             for _ in range(3000):
-                stage.bridge(10e-6, way * 0.05)
-                if getattr(stage.state, f"limit_{end}") == wanted:
+                stage.bridge(10e-6, direction * 0.05)
+                if getattr(stage.state, f"limit_{end}") == pressed:
                     break
-            places.append(stage.state.position_m)
+            positions.append(stage.state.position_m)
     return presses, releases
 
 
 @pytest.mark.parametrize("end", ("low", "high"))
-def test_switches_have_hysteresis_and_scatter_anew_each_time(end):
+def test_switches_have_hysteresis_and_scatter_each_time(end):
     p = parameters.values()
     presses, releases = actuations(3, end)
     outward, slack = (-1 if end == "low" else 1), p["switch_scatter"] + 10e-9
-    assert all(abs(place - p[f"switch_{end}"]) <= slack for place in releases)
+    assert all(abs(position - p[f"switch_{end}"]) <= slack for position in releases)
     assert all(
-        abs(place - p[f"switch_{end}"] - outward * p["switch_hysteresis"]) <= slack
-        for place in presses
+        abs(position - p[f"switch_{end}"] - outward * p["switch_hysteresis"]) <= slack
+        for position in presses
     )
     assert max(releases) - min(releases) > 0.1e-6 and max(presses) - min(presses) > 0.1e-6
     assert actuations(3, end) == (presses, releases)
@@ -257,11 +262,11 @@ def test_switches_have_hysteresis_and_scatter_anew_each_time(end):
 
 def test_the_stop_holds_the_table_at_full_voltage():
     stage = Stage()
-    for place, duty, inside in (
+    for position, duty, inside in (
         (-1.5e-3, -1.0, lambda x: -4e-3 < x < -2e-3),
         (121.5e-3, 1.0, lambda x: 122e-3 < x < 124e-3),
     ):
-        stage.set_position(place)
+        stage.set_position(position)
         stage.bridge(0.5, duty)
         assert inside(stage.state.position_m) and abs(stage.state.velocity_m_s) < 1e-6
 

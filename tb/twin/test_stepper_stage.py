@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The axis of S2, by pulses at its pins: where they carry it, when it loses them, and its scale."""
+"""The axis of S2, driven by pulses at its pins: its motion, lost steps, and its scale."""
 
 import math
 
@@ -22,23 +22,23 @@ FREE = dict(
 )
 
 
-def stepper(clk_hz=1_000_000, place=20e-3, **values):
+def stepper(clk_hz=1_000_000, position=20e-3, **values):
     machine = Machine("stepper_stage", clk_hz=clk_hz, **values)
     machine.pins(drive_enable=1)
-    machine.set_position(place)
+    machine.set_position(position)
     machine.run(0.01)
     return machine
 
 
 def ramp(machine, rate_hz, sign=1):
-    """Pulses at a rate that grows in steps, as a profile would; returns how many."""
+    """Send pulses at a rate that grows in steps, as a profile does; returns their number."""
     rates = numpy.arange(500, rate_hz, 500)
     for rate in rates:
         machine.steps(sign * max(1, round(rate * 2e-3)), rate)
     return int(sum(max(1, round(rate * 2e-3)) for rate in rates))
 
 
-def test_pulses_carry_the_table_their_way():
+def test_pulses_move_the_table_by_their_distance():
     machine = stepper(**FREE)
     start = machine.state.position_m
     for count, sign in ((400, 1), (300, -1), (1, -1)):
@@ -167,12 +167,12 @@ def test_the_scale_gives_an_edge_a_count_and_never_two_at_once():
             total += moved.sum()
         assert (
             abs(total - (machine.state.scale_counts - before)) <= 1
-        )  # an edge may lie between two watches
+        )  # an edge may be between two calls of watch
         assert abs(total) > 150
 
 
-def test_the_index_lies_in_its_place_one_count_wide_from_both_sides():
-    machine = stepper(place=74.98e-3, scale_index_scatter=0, clk_hz=1_000_000)
+def test_the_index_is_at_its_position_one_count_wide_from_both_sides():
+    machine = stepper(position=74.98e-3, scale_index_scatter=0, clk_hz=1_000_000)
     for sign in (1, -1):
         machine.trace(100_000)
         machine.steps(sign * 20, 2000)
@@ -185,12 +185,12 @@ def test_the_index_lies_in_its_place_one_count_wide_from_both_sides():
 
 
 def test_the_switches_open_at_the_ends():
-    for place, low, high in (
+    for position, low, high in (
         (-2.5e-3, True, False),
         (70e-3, False, False),
         (152.5e-3, False, True),
     ):
-        machine = stepper(place=place)
+        machine = stepper(position=position)
         assert (machine.state.limit_low, machine.state.limit_high) == (low, high)
         assert (machine.level("limit_low_open"), machine.level("limit_high_open")) == (low, high)
     machine = stepper()

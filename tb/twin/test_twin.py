@@ -1,20 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The twin as an instrument: its bus, its faults, its clock, and that the same seed gives the same
-run.
-"""
+"""The twin itself: its bus, its faults, its clock, and that the same seed gives the same run."""
 
 import zlib
 
 import numpy
 import pytest
 
-from twin import START_S, Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
+from twin import Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
 
 ASK = {1: 0x111, 2: 0x112}  # "slave, send data": 00 01 address, 9th bit 1
 
 
 def empty_reply(address):
-    """What a node answers before any request: 01 01 address, then sequence 0, operation 0, ok."""
+    """The answer of a node before any request: 01 01 address, then sequence 0, operation 0, ok."""
     text = bytes([0x50 | address, 3, 0, 0, 0])
     return [*text, *zlib.crc32(text).to_bytes(4, "little")]
 
@@ -22,18 +20,18 @@ def empty_reply(address):
 @pytest.fixture
 def twin():
     with Twin(seed=1) as made:
-        made.run(START_S)
+        made.run_until_ready()
         yield made
 
 
-def ask(twin, address=1, **damage):
+def poll(twin, address=1, **damage):
     twin.send_words([ASK[address]], **damage)
     twin.run_until_words(20, 0.005)
     return twin.receive_words()
 
 
 def test_both_nodes_answer_and_nobody_collides(twin):
-    assert ask(twin, 1) == empty_reply(1) and ask(twin, 2) == empty_reply(2)
+    assert poll(twin, 1) == empty_reply(1) and poll(twin, 2) == empty_reply(2)
     assert twin.bus().collisions == 0 and twin.bus().framing_errors == 0
     assert twin.bus_stays_idle(0.01)
 
@@ -62,45 +60,47 @@ def test_words_wait_until_they_are_taken(twin):
 
 
 @pytest.mark.parametrize("error", (-0.03, 0.03))
-def test_a_host_whose_baud_is_off_is_understood(error):
+def test_a_host_with_a_baud_rate_error_is_received(error):
     with Twin(seed=1, nodes=(1,), host_baud_error=error) as twin:
-        twin.run(START_S)
-        assert ask(twin) == empty_reply(1)
+        twin.run_until_ready()
+        assert poll(twin) == empty_reply(1)
 
 
 def test_a_flipped_bit_of_the_command_gives_silence(twin):
     for cell in range(1, 10):
-        assert ask(twin, flip_cells=[cell]) == []
-        assert ask(twin) == empty_reply(1)
+        assert poll(twin, flip_cells=[cell]) == []
+        assert poll(twin) == empty_reply(1)
 
 
 def test_a_flipped_bit_of_the_reply_reaches_the_host_as_such(twin):
     twin.flip_reply_cells([11 * 4 + 1 + 6])  # bit 6 of the fifth word
     expected = empty_reply(1)
     expected[4] ^= 1 << 6
-    assert ask(twin) == expected
+    assert poll(twin) == expected
     before = twin.bus().framing_errors
-    twin.flip_reply_cells([10])  # the first stop bit: a PC's port gives the word all the same
-    assert ask(twin) == empty_reply(1) and twin.bus().framing_errors == before + 1
-    assert ask(twin) == empty_reply(1)
+    twin.flip_reply_cells(
+        [10]
+    )  # the first stop bit: the port of a PC delivers the word nevertheless
+    assert poll(twin) == empty_reply(1) and twin.bus().framing_errors == before + 1
+    assert poll(twin) == empty_reply(1)
 
 
 @pytest.mark.parametrize("level", (True, False))
 def test_a_cut_node_is_silent_and_comes_back(twin, level):
     with twin.fault("line_cut", 0, level):
-        assert ask(twin, 1) == [] and ask(twin, 2) == empty_reply(2)
+        assert poll(twin, 1) == [] and poll(twin, 2) == empty_reply(2)
     twin.run(0.001)
-    assert ask(twin, 1) == empty_reply(1)
+    assert poll(twin, 1) == empty_reply(1)
     with twin.fault("line_cut", "host", level):
-        assert ask(twin, 2) == []
+        assert poll(twin, 2) == []
     twin.run(0.001)
-    assert ask(twin, 2) == empty_reply(2)
+    assert poll(twin, 2) == empty_reply(2)
 
 
 def test_nodes_of_one_address_collide():
     with Twin(seed=1, nodes=(1, 1)) as twin:
-        twin.run(START_S)
-        ask(twin)
+        twin.run_until_ready()
+        poll(twin)
         assert twin.bus().collisions > 0
 
 
@@ -123,15 +123,15 @@ def test_after_nonsense_and_spikes_the_nodes_answer_again(twin):
     twin.bus_spikes(0)
     twin.run(0.01)
     twin.receive_words()
-    assert ask(twin, 1) == empty_reply(1) and ask(twin, 2) == empty_reply(2)
+    assert poll(twin, 1) == empty_reply(1) and poll(twin, 2) == empty_reply(2)
 
 
 def record(seed, **arguments):
     with Twin(seed=seed, **arguments) as twin:
         twin.trace(0, 100_000)
-        twin.run(START_S)
+        twin.run_until_ready()
         twin.push(0, 30.0)
-        words = ask(twin)
+        words = poll(twin)
         return (
             words,
             twin.take_trace(0)["position_m"].tolist(),
@@ -146,9 +146,9 @@ def test_the_same_seed_gives_the_same_run():
     assert first != record(6)
 
 
-def test_the_axes_have_places_of_their_own(twin):
-    places = [twin.true_position_nm(n) for n in (0, 1)]
-    assert places[0] != places[1] and all(-0.8e6 <= place <= 2e6 for place in places)
+def test_the_axes_have_positions_of_their_own(twin):
+    positions = [twin.true_position_nm(n) for n in (0, 1)]
+    assert positions[0] != positions[1] and all(-0.8e6 <= position <= 2e6 for position in positions)
     with Twin(
         nodes=(1, 2), plant_of={1: {"travel_start_lowest": 0.05, "travel_start_highest": 0.05}}
     ) as other:
@@ -207,18 +207,18 @@ def test_a_node_drives_any_machine():
         ],
         seed=1,
     ) as twin:
-        twin.run(START_S)
+        twin.run_until_ready()
         assert (
             0.5e-3 <= twin.truth(0).position_m <= 1e-3 and 5e-3 <= twin.truth(1).position_m <= 20e-3
         )
         bus = Bus(TwinTransport(twin))
         motor, stepper = bus.axis(1), bus.axis(2)
-        for place, low, high in (
+        for position, low, high in (
             (-7.5e-3, True, False),
             (0.0, False, False),
             (7.5e-3, False, True),
         ):
-            twin.set_position(0, place)
+            twin.set_position(0, position)
             twin.run(0.001)
             status = motor.status()
             assert (status.limit_low, status.limit_high) == (low, high)
@@ -242,7 +242,7 @@ def test_axes_of_one_node_have_machines_of_their_own():
             "unconnected",
         ]
         assert twin.truth(1).sensor_frames == 25 and twin.truth(3).time_s == twin.time()
-        assert ask(twin, 1) == empty_reply(1) and ask(twin, 2) == empty_reply(2)
+        assert poll(twin, 1) == empty_reply(1) and poll(twin, 2) == empty_reply(2)
         twin.push(0, 30.0)
         before = [twin.truth(n).position_m for n in (0, 2)]
         twin.run(0.01)

@@ -20,7 +20,7 @@ def table(clk_hz=400_000, **values):
 
 
 def go(machine, pulses, rate_hz=20_000, rest_s=0.2):
-    """Slow at the start and at the end, as a profile would."""
+    """Send pulses, slowly at the start and at the end, as a profile does."""
     sign, gentle = (1 if pulses > 0 else -1), min(abs(pulses) // 2, 500)
     machine.steps(sign * gentle, 4000)
     machine.steps(sign * (abs(pulses) - 2 * gentle), rate_hz)
@@ -56,7 +56,7 @@ def test_the_worm_has_its_periodic_errors():
     )
 
 
-def test_the_way_back_loses_the_backlash():
+def test_a_reversal_loses_the_backlash():
     machine = table(worm_error=0, worm_second_error=0, worm_wheel_error=0)
     up = go(machine, 2000)
     down = go(machine, -1000)
@@ -66,11 +66,11 @@ def test_the_way_back_loses_the_backlash():
     assert 20 < lost < 20 + 2 * 3.4 + 2 * 1
     assert (go(machine, 1000) - up) / ARC_SECOND == pytest.approx(
         0, abs=0.1
-    )  # approached from one side it is the same place
+    )  # approached from one side, it is the same angle
 
 
 def frames(levels, bit):
-    """The bytes on the line, by themselves: start bit, eight data, stop bit."""
+    """Decode the bytes on the line: start bit, eight data bits, stop bit."""
     out, n = [], 0
     while n < len(levels) - 10 * bit:
         if levels[n]:
@@ -101,8 +101,8 @@ def angle_of(frame):
 
 
 def readings(machine, seconds):
-    """[(clk of the first start bit, sequence, angle in rad)] of the frames whose check is right,
-    and the count of the others.
+    """[(cycle of the first start bit, sequence, angle in rad)] of the frames with a correct CRC,
+    and the number of the others.
     """
     data = frames(machine.watch(seconds)["sensor_rx"], machine.clk_hz / 115200)
     found = [
@@ -153,7 +153,7 @@ def test_the_angle_is_as_old_as_the_latency():
         assert (angle - then) / ARC_SECOND == pytest.approx(0, abs=0.05)
 
 
-def test_frames_are_dropped_and_damaged_as_often_as_asked():
+def test_frames_are_dropped_and_damaged_at_the_given_rate():
     machine = Machine("worm_table", clk_hz=1_000_000, sensor_dropped=0.1, sensor_corrupt=0.2)
     values, bad = readings(machine, 3.0)
     state = machine.state
@@ -186,6 +186,6 @@ def test_faults_of_the_sensor():
     assert machine.state.lost_steps == 800
 
 
-def test_each_machine_is_another_by_its_seed():
-    places = {Machine("worm_table", seed=seed).state.position_rad for seed in range(5)}
-    assert len(places) == 5
+def test_each_seed_makes_another_machine():
+    angles = {Machine("worm_table", seed=seed).state.position_rad for seed in range(5)}
+    assert len(angles) == 5

@@ -7,7 +7,8 @@ from ctypes import c_bool, c_int16, c_int32, c_int64, c_uint8, c_uint16, c_uint3
 from functools import cache
 from typing import Any
 
-from twin.compiled.host_library import FIRMWARE, host_library
+from twin.build import FIRMWARE
+from twin.compiled.host_library import host_library
 
 # The constants of calibration_types.h and calibration_values.h.
 ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS = 10, 256, 1024, 2048, 39

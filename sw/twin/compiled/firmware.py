@@ -104,7 +104,7 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 
 @cache
 def library(image: str = "axis") -> ctypes.CDLL:
-    """The firmware of an image. Its state is one for all FakeNode objects of that image: who starts
+    """The firmware of an image. Its state is one for all FakeNode objects of that image: starting
     one resets it.
     """
     sources = [path for path in firmware_build.sources_of(image) if path.suffix == ".c"]

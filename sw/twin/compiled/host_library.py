@@ -10,8 +10,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[3]
-FIRMWARE = ROOT / "sw" / "firmware"
+from twin.build import FIRMWARE, ROOT
+
 OPTIONS = [
     "-std=c11",
     "-O1",

@@ -17,8 +17,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
+from twin.build import FIRMWARE, ROOT
 from twin.compiled.firmware import READ, WRITE, library
-from twin.compiled.host_library import FIRMWARE, ROOT
 
 DEFINES = {
     name: int(value.rstrip("u"), 0)
@@ -368,7 +368,7 @@ class FakeFeedbackChannel:
         )
 
     def use_segments(self, value: int) -> None:
-        """Put the segment table into force, or out of it, as the register segment_use says."""
+        """Put the segment table into force, or out of it, as the register segment_use demands."""
         self.use = (
             dict(
                 linear=bool(value & 2),
@@ -417,7 +417,7 @@ class FakeFeedbackChannel:
 
 
 class Peripherals(Protocol):
-    """What stands behind the registers of the block `peripherals`."""
+    """The devices behind the registers of the block `peripherals`."""
 
     def read(self, offset: int) -> int:
         """A register of the block."""
@@ -563,7 +563,7 @@ class FakeNode:
                 return True
         return False
 
-    def hear(self, words: Sequence[int]) -> bytes:
+    def receive(self, words: Sequence[int]) -> bytes:
         """Put words on the bus; returns what the node sends."""
         self.sent.clear()
         for n in range(0, len(words), 8):
@@ -582,12 +582,12 @@ class FakeNode:
 
     def send(self, body: bytes) -> None:
         """Send a request, which the node must acknowledge."""
-        assert self.hear(self.frame(body)) == bytes([0x60 | self.address])
+        assert self.receive(self.frame(body)) == bytes([0x60 | self.address])
 
     def reply(self) -> bytes:
         """The body that the node sends when it is asked for its reply."""
         ready = 0x50 | self.address
-        sent = self.hear([0x10 | self.address | DEFINES["BUS_RECEIVE_COMMAND_MASK"]])
+        sent = self.receive([0x10 | self.address | DEFINES["BUS_RECEIVE_COMMAND_MASK"]])
         assert sent[0] == ready and len(sent) == sent[1] + 6
         assert zlib.crc32(sent[:-4]) == int.from_bytes(sent[-4:], "little")
         return sent[2:-4]

@@ -288,7 +288,7 @@ class Edm:
     IDLE, KEY = ms(300), ms(1)
 
     def __init__(self) -> None:
-        self.heard = b""  # scan codes
+        self.received = b""  # scan codes
         self.cuts: list[int] = []  # when they began
         self.cut_ms, self.reaction_ms = 400, 50
         self.deaf = self.endless = self.takes_nothing = False
@@ -328,12 +328,12 @@ class Edm:
         free = now - self.quiet_since > self.IDLE and not self.takes_nothing
         if self.queue and (free or self.injecting) and now >= self.next_key:
             byte, last = self.queue.popleft()
-            self.injecting, self.next_key, self.heard = (
+            self.injecting, self.next_key, self.received = (
                 not last,
                 now + self.KEY,
-                self.heard + bytes([byte]),
+                self.received + bytes([byte]),
             )
-            if self.heard.endswith(self.START) and not self.deaf and not self.inputs:
+            if self.received.endswith(self.START) and not self.deaf and not self.inputs:
                 self.start_at = now + ms(self.reaction_ms)
         if self.start_at is not None and now >= self.start_at:
             self.start_at, self.end_at = None, now + ms(self.cut_ms)
@@ -434,7 +434,7 @@ class Station(FakeNode):
             self.edm.edges &= ~value
         elif at == d["PERIPHERALS_PEER_TRANSMIT"]:
             if self.sub_node:
-                self.sub_node.hear(self.clk, value)
+                self.sub_node.receive(self.clk, value)
         else:
             self.word[offset] = value
 
@@ -552,7 +552,7 @@ class SubNode:
         self.cause_persists = False  # a reset does not help
         self.resets = 0
 
-    def hear(self, now: int, byte: int) -> None:
+    def receive(self, now: int, byte: int) -> None:
         """A byte from the main node."""
         if self.dead:
             return

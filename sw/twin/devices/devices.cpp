@@ -100,7 +100,7 @@ const char* Devices::faults() { return FAULTS; }
 bool Devices::fault(const char* name, bool on) {
     const struct {
         const char* name;
-        bool* place;
+        bool* flag;
         bool always;  // what is not there is dead
     } known[] = {{"eeprom_dead", &eeprom.dead, !(fitted_ & FITTED_EEPROM)},
                  {"keypad_dead", &keypad.dead, !(fitted_ & FITTED_KEYPAD)},
@@ -113,7 +113,7 @@ bool Devices::fault(const char* name, bool on) {
                  {"edm_deaf", &edm.deaf, false}};
     for (const auto& fault : known)
         if (!std::strcmp(fault.name, name)) {
-            *fault.place = on || fault.always;
+            *fault.flag = on || fault.always;
             wake();
             return true;
         }
@@ -121,17 +121,17 @@ bool Devices::fault(const char* name, bool on) {
 }
 
 bool Devices::set(const char* name, double value) {
-    double* place = find_parameter(p_, name);
-    if (!place) return false;
-    *place = value;
+    double* found = find_parameter(p_, name);
+    if (!found) return false;
+    *found = value;
     configure();
     return true;
 }
 
 bool Devices::get(const char* name, double& value) {
-    const double* place = find_parameter(p_, name);
-    if (place) value = *place;
-    return place;
+    const double* found = find_parameter(p_, name);
+    if (found) value = *found;
+    return found;
 }
 
 const char* Devices::state_names() {

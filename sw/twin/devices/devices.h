@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands around a node besides its axes: devices on its I2C bus, a PS/2 keyboard, the PC of a
-// machine at the other PS/2 port, that machine's state, a numeric display. Like a Machine it costs
-// one comparison a clk while nothing happens.
+// The devices of a node besides its axes: devices on its I2C bus, a PS/2 keyboard, the PC of a
+// machine at the other PS/2 port, the state of that machine, a numeric display. Like a Machine it
+// costs one comparison a cycle while nothing happens.
 #pragma once
 #include <functional>
 
@@ -55,7 +55,7 @@ class Devices {
     Devices(const DevicesParameters& parameters, unsigned fitted, uint64_t seed, uint64_t stream,
             double clk_hz);
 
-    // the node's pins after clk `now`; true when levels may have changed
+    // the node's pins after cycle `now`; true when levels may have changed
     bool clk(uint64_t now, unsigned drive) {
         if (drive == drive_ && now < event_at_) return false;
         advance(now, drive);

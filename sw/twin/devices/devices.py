@@ -8,7 +8,8 @@ a node of the twin (Twin.devices), or used without one, with their pins driven f
     panel.lines, panel.digits                                what the displays show
     panel.type([0x1C, 0xF0, 0x1C], after_s=0.1)              a person at the keyboard
     panel.cuts                                               [EdmCut(start_s, end_s,
-                                                             angle_start_rad, angle_end_rad, whole)]
+                                                             angle_start_rad, angle_end_rad,
+                                                             complete)]
 """
 
 import ctypes
@@ -56,7 +57,7 @@ FUNCTIONS: Functions = {
     "devices_type": (None, [HANDLE, HANDLE, WHOLE, LONG]),
     "devices_commands": (WHOLE, [HANDLE, HANDLE, WHOLE]),
     "devices_order": (None, [HANDLE, HANDLE, WHOLE]),
-    "devices_heard": (WHOLE, [HANDLE, HANDLE, HANDLE, WHOLE]),
+    "devices_received": (WHOLE, [HANDLE, HANDLE, HANDLE, WHOLE]),
     "devices_cuts": (WHOLE, [HANDLE]),
     "devices_cut": (None, [HANDLE, WHOLE, HANDLE, HANDLE, HANDLE]),
 }
@@ -64,7 +65,7 @@ PEER_FUNCTIONS: Functions = {
     "peer_line_put": (None, [HANDLE, HANDLE, WHOLE, LONG]),
     "peer_line_garbage": (None, [HANDLE, REAL, LONG]),
     "peer_line_cut": (None, [HANDLE, WHOLE]),
-    "peer_line_heard": (WHOLE, [HANDLE, HANDLE, WHOLE]),
+    "peer_line_received": (WHOLE, [HANDLE, HANDLE, WHOLE]),
     "peer_line_counts": (None, [HANDLE, HANDLE]),
 }
 BENCH_FUNCTIONS: Functions = {
@@ -191,7 +192,7 @@ class EdmCut:
     end_s: float | None
     angle_start_rad: float
     angle_end_rad: float | None
-    whole: bool  # no alarm ended it
+    complete: bool  # no alarm ended it
 
 
 def pack(overrides: Mapping[str, float], library: ctypes.CDLL) -> "ctypes.Array[ctypes.c_double]":
@@ -341,23 +342,23 @@ class DevicesHandle:
         commands = bytes(commands)
         self.library.devices_order(self.handle, commands, len(commands))
 
-    def take_heard(self) -> list[tuple[float, int]]:
+    def take_received(self) -> list[tuple[float, int]]:
         """[(time in s, byte)] that the PC of the EDM machine received since the previous call,
         answers to its commands included.
         """
         data, at = ctypes.create_string_buffer(MOST), (ctypes.c_uint64 * MOST)()
-        heard = []
-        while count := self.library.devices_heard(self.handle, data, at, MOST):
-            heard += [(at[n] / self.clk_hz, data.raw[n]) for n in range(count)]
-        return heard
+        received = []
+        while count := self.library.devices_received(self.handle, data, at, MOST):
+            received += [(at[n] / self.clk_hz, data.raw[n]) for n in range(count)]
+        return received
 
     @property
     def cuts(self) -> list[EdmCut]:
         """The log of the EDM machine."""
         found = []
-        clk, angle, whole = (ctypes.c_uint64 * 2)(), (ctypes.c_double * 2)(), ctypes.c_int()
+        clk, angle, complete = (ctypes.c_uint64 * 2)(), (ctypes.c_double * 2)(), ctypes.c_int()
         for n in range(self.library.devices_cuts(self.handle)):
-            self.library.devices_cut(self.handle, n, clk, angle, ctypes.addressof(whole))
+            self.library.devices_cut(self.handle, n, clk, angle, ctypes.addressof(complete))
             on = clk[1] == GOES_ON
             found.append(
                 EdmCut(
@@ -365,7 +366,7 @@ class DevicesHandle:
                     None if on else clk[1] / self.clk_hz,
                     angle[0],
                     None if on else angle[1],
-                    bool(whole.value),
+                    bool(complete.value),
                 )
             )
         return found
@@ -390,9 +391,9 @@ class PeerLineHandle:
         """Cut the line, or repair it."""
         self.library.peer_line_cut(self.handle, cut)
 
-    def take_heard(self) -> bytes:
+    def take_received(self) -> bytes:
         """The bytes that a receiver on the line has decoded since the previous call."""
-        return taken(partial(self.library.peer_line_heard, self.handle))
+        return taken(partial(self.library.peer_line_received, self.handle))
 
     @property
     def framing_errors(self) -> int:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// C interface to what stands around a node: to that of a node of the twin, and to one without a
-// node, whose pins are driven from here.
+// C interface to the devices of a node: in the twin, and without a node, with pins driven from
+// here.
 #include <algorithm>
 
 #include "nodes/peer_line.h"
@@ -23,7 +23,7 @@ class DevicesBench {  // without a node
         }
     }
 
-    void cable() {  // a clk with the keyboard straight at the machine's port, no node between
+    void cable() {  // a cycle with the keyboard connected to the machine's port, without a node
         const Ps2Keyboard& keyboard = devices.keyboard;
         const Ps2Computer& computer = devices.computer;
         drive = PERIPHERAL_DRIVE_IDLE | KEYBOARD_CLOCK_LOW * computer.clock_low |
@@ -72,25 +72,25 @@ void devices_order(Devices* s, const uint8_t* bytes, int count) {
     s->computer.order(bytes, count);
     s->wake();
 }
-int devices_heard(Devices* s, uint8_t* bytes, uint64_t* at, int most) {
-    auto& heard = s->computer.heard;
-    const int count = int(std::min<size_t>(heard.size(), size_t(most)));
+int devices_received(Devices* s, uint8_t* bytes, uint64_t* at, int most) {
+    auto& received = s->computer.received;
+    const int count = int(std::min<size_t>(received.size(), size_t(most)));
     for (int n = 0; n < count; n++) {
-        bytes[n] = heard[size_t(n)].byte;
-        at[n] = heard[size_t(n)].at;
+        bytes[n] = received[size_t(n)].byte;
+        at[n] = received[size_t(n)].at;
     }
-    heard.erase(heard.begin(), heard.begin() + count);
+    received.erase(received.begin(), received.begin() + count);
     return count;
 }
 int devices_cuts(Devices* s) { return int(s->edm.cuts.size()); }
 void devices_cut(Devices* s, int n, uint64_t* clk, double* angle,
-                 int* whole) {  // start and end; end ~0: it goes on
+                 int* complete) {  // start and end; end ~0: it goes on
     const EdmCut& cut = s->edm.cuts[size_t(n)];
     clk[0] = cut.start;
     clk[1] = cut.end;
     angle[0] = cut.angle_start;
     angle[1] = cut.angle_end;
-    *whole = cut.whole;
+    *complete = cut.complete;
 }
 
 void* devices_bench_new(const DevicesParameters* parameters, unsigned fitted, uint64_t seed,
@@ -106,7 +106,7 @@ void devices_bench_pins(DevicesBench* bench, unsigned values, unsigned which) {
 }
 void devices_bench_run(DevicesBench* bench, uint64_t clk) { bench->run(clk); }
 void devices_bench_watch(DevicesBench* bench, uint64_t clk,
-                         uint16_t* levels) {  // the same, with the levels after each clk
+                         uint16_t* levels) {  // the same, with the levels after each cycle
     for (uint64_t n = 0; n < clk; n++) {
         bench->run(1);
         levels[n] = uint16_t(bench->devices.levels());
@@ -129,7 +129,7 @@ void* peer_line_new(uint64_t seed, double clk_hz, double baud) {
 }
 void peer_line_delete(PeerLine* line) { delete line; }
 void peer_line_levels(PeerLine* line, uint64_t from, uint64_t clk, const uint8_t* tx,
-                      uint8_t* rx) {  // n clk, the first is `from`
+                      uint8_t* rx) {  // n cycles, the first is `from`
     for (uint64_t n = 0; n < clk; n++) rx[n] = line->step(from + n, tx[n]);
 }
 void peer_line_put(PeerLine* line, const uint8_t* bytes, int count, uint64_t now) {
@@ -137,7 +137,9 @@ void peer_line_put(PeerLine* line, const uint8_t* bytes, int count, uint64_t now
 }
 void peer_line_garbage(PeerLine* line, double rate, uint64_t now) { line->garbage(rate, now); }
 void peer_line_cut(PeerLine* line, int cut) { line->cut = cut; }
-int peer_line_heard(PeerLine* line, uint8_t* out, int most) { return take(line->heard, out, most); }
+int peer_line_received(PeerLine* line, uint8_t* out, int most) {
+    return take(line->received, out, most);
+}
 void peer_line_counts(PeerLine* line, uint64_t* out) {  // framing errors, bytes of garbage
     out[0] = line->framing_errors;
     out[1] = line->garbage_bytes;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The wire-EDM machine of S4, as far as an indexing table sees it: keys of its keyboard start a
-// cut, two opto-couplers tell its state.
+// cut, two opto-couplers report its state.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -42,7 +42,7 @@ struct EdmCut {
     static constexpr uint64_t GOES_ON = ~uint64_t(0);
     uint64_t start, end = GOES_ON;
     double angle_start, angle_end = NAN;  // of the table, true
-    bool whole = false;                   // no alarm ended it
+    bool complete = false;                // no alarm ended it
 };
 
 class Edm {
@@ -99,11 +99,11 @@ class Edm {
     uint64_t starts = 0, ignored = 0;  // start sequences; of them while cutting, in alarm or deaf
 
  private:
-    void end(uint64_t now, double angle, bool whole) {
+    void end(uint64_t now, double angle, bool complete) {
         EdmCut& cut = cuts.back();
         cut.end = now;
         cut.angle_end = angle;
-        cut.whole = whole;
+        cut.complete = complete;
         cutting.set(now, false, bounce_);
     }
 

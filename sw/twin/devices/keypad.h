@@ -61,9 +61,9 @@ class Keypad : public I2cDevice {
         uint8_t byte = pointer_ < registers_.size() ? registers_[pointer_] : 0;
         if (pointer_ == COUNT) byte = uint8_t(events_.size());
         if (pointer_ >= FIRST_EVENT && pointer_ <= LAST_EVENT) {
-            const size_t place = pointer_ - FIRST_EVENT;
-            byte = place < events_.size() ? events_[place] : 0;
-            if (place == 0 && byte) events_.pop_front();
+            const size_t index = pointer_ - FIRST_EVENT;
+            byte = index < events_.size() ? events_[index] : 0;
+            if (index == 0 && byte) events_.pop_front();
         }
         next();
         return byte;

@@ -22,7 +22,7 @@ void Ps2Computer::fell(uint64_t now, bool data) {
             data_low = !(frame_ >> ++bit_ & 1);
             return;
         }
-        listen(now);
+        release_lines(now);
         if (data) failed(now);
     } else if (mode_ == LISTENS) {
         if (bit_ == 0) frame_ = 0;
@@ -34,13 +34,13 @@ void Ps2Computer::fell(uint64_t now, bool data) {
         const uint8_t byte = uint8_t(frame_ >> 1);
         again_ = frame_ != ps2_frame(byte);
         damaged += again_;
-        listen(now);
+        release_lines(now);
         if (!again_) take(now, byte);
     }
 }
 
 void Ps2Computer::take(uint64_t now, uint8_t byte) {
-    heard.push_back({now, byte});
+    received.push_back({now, byte});
     if (!awaits_) return keys.push_back(byte);
     if (byte == 0xFA || (byte == 0xEE && orders_.front() == 0xEE)) {
         orders_.pop_front();
@@ -57,7 +57,7 @@ void Ps2Computer::take(uint64_t now, uint8_t byte) {
 void Ps2Computer::timers(uint64_t now) {
     const bool due = now >= at_;
     if (mode_ == INHIBITS && due) {
-        listen(now);
+        release_lines(now);
         clock_low = false;
         pause_ = now + us(PAUSE);
     } else if (mode_ == ASKS && due) {
@@ -67,12 +67,12 @@ void Ps2Computer::timers(uint64_t now) {
         clock_low = false;
         at_ = now + us(FIRST);
     } else if (mode_ == SENDS && due) {
-        listen(now);
+        release_lines(now);
         data_low = false;
         failed(now);
     } else if (mode_ == LISTENS && due) {
         if (bit_) {  // a frame that never ended
-            listen(now);
+            release_lines(now);
             damaged++;
         } else {
             failed(now);
@@ -81,11 +81,11 @@ void Ps2Computer::timers(uint64_t now) {
     if (mode_ != LISTENS) return;
     if (now >= processes_at_) {
         processes_at_ = NEVER;
-        if (again_) return ask(now, 0xFE);  // before another byte comes
+        if (again_) return send(now, 0xFE);  // before another byte comes
         if (processing_ > 0) return hold(now, us(processing_ * 1e6));
     }
     if (now >= inhibit_at_) {
-        if (bit_ == 10) {  // no device can tell a cut at its last edge
+        if (bit_ == 10) {  // a device cannot detect a cut at its last edge
             inhibit_at_ = now + us(HOLD);
             return;
         }
@@ -95,7 +95,7 @@ void Ps2Computer::timers(uint64_t now) {
         }
         inhibit_at_ = now + uint64_t(random_.exponential(clk_hz_ / inhibits_)) + us(2000);
     } else if (may_order() && now >= pause_) {
-        ask(now, orders_.front());
+        send(now, orders_.front());
     }
 }
 
@@ -105,13 +105,13 @@ void Ps2Computer::hold(uint64_t now, uint64_t clk) {
     at_ = now + clk;
 }
 
-void Ps2Computer::listen(uint64_t now) {  // for a new byte
+void Ps2Computer::release_lines(uint64_t now) {  // for a new byte
     mode_ = LISTENS;
     bit_ = 0;
     at_ = awaits_ || again_ ? now + us(ANSWER) : NEVER;
 }
 
-void Ps2Computer::ask(uint64_t now, uint8_t byte) {
+void Ps2Computer::send(uint64_t now, uint8_t byte) {
     frame_ = ps2_frame(byte);
     awaits_ |= !again_;
     mode_ = ASKS;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host side of a PS/2 line, the PC of a machine: takes scan codes, asks for damaged ones again
+// The host side of a PS/2 line, the PC of a machine: takes scan codes, requests damaged ones again
 // (FE), sends commands with their arguments and waits for the answers. It holds the keyboard after
 // each byte, as an 8042 does, and at random times.
 #pragma once
@@ -15,7 +15,7 @@ namespace twin {
 class Ps2Computer {
  public:
     static constexpr uint64_t NEVER = ~uint64_t(0);
-    struct Heard {
+    struct Received {
         uint64_t at;
         uint8_t byte;
     };
@@ -34,12 +34,12 @@ class Ps2Computer {
         orders_.insert(orders_.end(), bytes, bytes + count);
     }
     size_t waiting() const { return orders_.size(); }
-    // the levels of the lines at clk `now`, whenever they have changed or it has asked for; returns
-    // when to be called again
+    // takes the levels of the lines at cycle `now`, called when they change and at the requested
+    // time; returns when to be called again
     uint64_t step(uint64_t now, bool clock, bool data);
 
     bool clock_low = false, data_low = false;  // pulls
-    std::vector<Heard> heard;                  // every good byte
+    std::vector<Received> received;            // every good byte
     std::vector<uint8_t> keys;                 // of them those that are no answers, until taken
     uint64_t damaged = 0, unanswered = 0, inhibits = 0;
 
@@ -57,8 +57,8 @@ class Ps2Computer {
     void take(uint64_t now, uint8_t byte);
     void timers(uint64_t now);
     void hold(uint64_t now, uint64_t clk);
-    void listen(uint64_t now);
-    void ask(uint64_t now, uint8_t byte);
+    void release_lines(uint64_t now);
+    void send(uint64_t now, uint8_t byte);
     void failed(uint64_t now);
     uint64_t next() const;
 

@@ -16,7 +16,7 @@ uint64_t Ps2Keyboard::step(uint64_t now, bool clock, bool data) {
         answers_.clear();
         return stop();
     }
-    if (mode_ == RESTS) return rest(now, clock, data);
+    if (mode_ == IDLES) return idle(now, clock, data);
     if (now < at_) return at_;
     const bool held = !clock && phase_ != LOW;
     switch (phase_) {
@@ -59,7 +59,7 @@ uint64_t Ps2Keyboard::step(uint64_t now, bool clock, bool data) {
     return now + 1;
 }
 
-uint64_t Ps2Keyboard::rest(uint64_t now, bool clock, bool data) {
+uint64_t Ps2Keyboard::idle(uint64_t now, bool clock, bool data) {
     if (!clock) {
         free_since_ = NEVER;
         return NEVER;
@@ -91,7 +91,7 @@ void Ps2Keyboard::set_bit() {
 }
 
 uint64_t Ps2Keyboard::stop() {
-    mode_ = RESTS;
+    mode_ = IDLES;
     clock_low = data_low = false;
     free_since_ = NEVER;
     return dead ? NEVER : 0;

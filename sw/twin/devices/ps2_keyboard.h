@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A PS/2 keyboard: makes the clock of both directions (12.5 kHz), waits while the host holds it,
 // begins a byte again that the host cut short, takes the host's commands and answers them. It types
-// what it is told and when.
+// the given bytes at the given times.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -27,8 +27,8 @@ class Ps2Keyboard {
     void type(const uint8_t* bytes, int count,
               uint64_t now);  // behind what waits, not before `now`
     size_t waiting() const { return typed_.size(); }
-    // the levels of the lines at clk `now`, whenever they have changed or it has asked for; returns
-    // when to be called again
+    // takes the levels of the lines at cycle `now`, called when they change and at the requested
+    // time; returns when to be called again
     uint64_t step(uint64_t now, bool clock, bool data);
 
     bool clock_low = false, data_low = false;  // pulls
@@ -40,7 +40,7 @@ class Ps2Keyboard {
  private:
     static constexpr double HALF = 40, FREE = 50,
                             ANSWER = 500;  // us: half a bit, quiet before a byte, before an answer
-    enum Mode { RESTS, SENDS, RECEIVES };
+    enum Mode { IDLES, SENDS, RECEIVES };
     enum Phase { BEFORE, LOW, AFTER };  // of a clock pulse
     struct Due {
         uint64_t at;
@@ -48,7 +48,7 @@ class Ps2Keyboard {
     };
 
     uint64_t us(double n) const { return uint64_t(n * us_) + 1; }
-    uint64_t rest(uint64_t now, bool clock, bool data);
+    uint64_t idle(uint64_t now, bool clock, bool data);
     uint64_t begin(uint64_t now, Mode mode);
     uint64_t stop();
     void set_bit();
@@ -57,7 +57,7 @@ class Ps2Keyboard {
 
     double us_ = 1;
     uint64_t self_test_ = 0, at_ = 0, free_since_ = NEVER;
-    Mode mode_ = RESTS;
+    Mode mode_ = IDLES;
     Phase phase_ = BEFORE;
     int bit_ = 0;
     unsigned frame_ = 0;

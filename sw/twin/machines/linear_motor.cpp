@@ -38,10 +38,10 @@ void LinearMotor::set_position(double where) {
 
 void LinearMotor::move(uint64_t) {
     const double dt = time_step();
-    double wanted =
+    double demanded =
         drive() & DRIVE_ENABLE ? p_.amplifier_gain * p_.amplifier_reference * dac_.share() : 0;
-    wanted = std::fmax(-p_.amplifier_limit, std::fmin(p_.amplifier_limit, wanted));
-    current_ += (wanted - current_) * -std::expm1(-2 * M_PI * p_.amplifier_bandwidth * dt);
+    demanded = std::fmax(-p_.amplifier_limit, std::fmin(p_.amplifier_limit, demanded));
+    current_ += (demanded - current_) * -std::expm1(-2 * M_PI * p_.amplifier_bandwidth * dt);
 
     double force = p_.motor_constant * current_ + pushed_ - p_.flexure_stiffness * position_ -
                    p_.cable_stiffness * (position_ - p_.cable_position);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The linear motor of S3: voice coil on a current amplifier that a bipolar converter sets, mover on
+// The linear motor of S3: voice coil on a current amplifier that a bipolar DAC sets, mover on
 // guides with a flexure and a cable, linear scale with a reference mark, end stops and limit
 // switches.
 //

@@ -60,18 +60,18 @@ void Machine::advance(uint64_t now, unsigned drive) {
 }
 
 bool Machine::set(const char* name, double value) {
-    double* place = parameter(name);
-    if (!place || !std::strcmp(name, "time_step"))
+    double* found = parameter(name);
+    if (!found || !std::strcmp(name, "time_step"))
         return false;  // the time step is fixed at the start
-    *place = value;
+    *found = value;
     configure();
     return true;
 }
 
 bool Machine::get(const char* name, double& value) {
-    const double* place = parameter(name);
-    if (place) value = *place;
-    return place;
+    const double* found = parameter(name);
+    if (found) value = *found;
+    return found;
 }
 
 bool Machine::fault(const char* name, bool on, bool level) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A machine as one axis of a node sees it: pins in, pins out, advanced clk by clk. A machine that
-// nothing happens to costs one comparison a clk: it is called when a pin that drives it changes,
-// and when it asked to be called.
+// A machine as one axis of a node sees it: pins in, pins out, advanced cycle by cycle. An idle
+// machine costs one comparison a cycle: it is called when a pin that drives it changes, and at the
+// time that it requested.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -44,7 +44,7 @@ class Machine {
     Machine(double clk_hz, double time_step);
     virtual ~Machine() = default;
 
-    // the node's pins after clk `now`; true when levels may have changed
+    // the node's pins after cycle `now`; true when levels may have changed
     bool clk(uint64_t now, unsigned drive) {
         if (drive == drive_ && now < event_at_) return false;
         advance(now, drive);
@@ -58,11 +58,11 @@ class Machine {
     bool fault(const char* name, bool on, bool level);  // false: there is no such fault
     virtual const char* faults() const = 0;             // their names
     virtual void set_position(
-        double position) = 0;             // carry it there by hand: at rest, nothing wound up
+        double position) = 0;             // move it there by hand: at rest, without tension
     virtual void push(double force) = 0;  // from outside, from now on
     virtual double position(uint64_t) const {
         return NAN;
-    }  // m or rad, true; NAN: it has none to tell
+    }  // m or rad, true; NAN: it has no position
 
     // names of the values of state(), the first time_s; a last ? marks a truth value, # a whole
     // number

@@ -27,7 +27,7 @@ class Bench {  // a machine without a node
     std::unique_ptr<Machine> machine;
     double clk_hz;
     uint64_t now = 0;
-    uint32_t phase = 0;  // clk within the PWM period
+    uint32_t phase = 0;  // cycle within the PWM period
 
  private:
     unsigned drive_ = DRIVE_IDLE;
@@ -74,8 +74,8 @@ void bench_watch(Bench* bench, uint64_t clk,
         levels[n] = uint16_t(bench->machine->levels());
     }
 }
-// Run n clk: `on` of every `period` clk driven (negative: in reverse), the rest braking or
-// coasting.
+// Run n cycles: `on` of every `period` cycles driven (negative: in reverse), braking or coasting in
+// the remainder.
 void bench_bridge(Bench* bench, uint64_t clk, uint32_t period, int32_t on, int brakes) {
     const uint32_t length = uint32_t(on < 0 ? -on : on);
     while (clk) {
@@ -100,7 +100,7 @@ void bench_steps(Bench* bench, int64_t count, uint32_t period, uint32_t high, ui
         bench->run(period - high);
     }
 }
-// One frame to the converter: `bits` of the word, MSB first, two clk a bit.
+// One frame to the DAC: `bits` of the word, MSB first, two cycles a bit.
 void bench_frame(Bench* bench, uint32_t word, int bits) {
     bench->pins(0, DAC_CS_N);
     for (int n = bits - 1; n >= 0; n--) {
@@ -115,7 +115,7 @@ void bench_frame(Bench* bench, uint32_t word, int bits) {
     bench->run(1);
 }
 
-// what only the stage has
+// functions of the stage only
 static Stage& stage_of(Bench* bench) { return static_cast<Stage&>(*bench->machine); }
 void stage_hold(Bench* bench, int rotor, int table) {
     stage_of(bench).plant.drivetrain.jammed = rotor;
@@ -130,7 +130,7 @@ void stage_convert(Bench* bench, double position, uint32_t* out) {
     out[0] = interferometer.code_sin;
     out[1] = interferometer.code_cos;
 }
-// The bits of one frame as they stand before each of `count` falling edges of sclk, sine in bit 0,
+// The bits of one frame before each of `count` falling edges of sclk, sine in bit 0,
 // cosine in bit 1.
 void stage_frame(Bench* bench, double position, int count, uint8_t* bits) {
     Interferometer& interferometer = stage_of(bench).interferometer;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stage of S0: plant, and on wish a piezo on its table; interferometer and converters.
+// The stage of S0: plant, optionally with a piezo on its table; interferometer and ADC.
 #pragma once
 #include <array>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The line: RS-485 with bias (idles 1), shared by the host and the nodes, each with a driver
+// The RS-485 bus with bias (idles 1), shared by the host and the nodes, each with a driver
 // enable; receivers are off while their own driver is on. The host's end is a UART of 9-bit
 // characters: start, 8 data LSB first, 9th bit, stop.
 #pragma once
@@ -21,9 +21,9 @@ class HostUart {
     void send_words(const uint16_t* words, int count, const uint32_t* flips, int flip_count,
                     int gap_cells);
     void send_levels(const uint8_t* levels, int count,
-                     double cell_clk);  // anything at all, cell by cell
+                     double cell_clk);  // any levels, cell by cell
 
-    void step(uint64_t now, bool level) {  // once a clk, with the level its receiver sees
+    void step(uint64_t now, bool level) {  // once a cycle, with the level its receiver sees
         if (now >= transmit_at_) transmit(now);
         if (receiving_) {
             if (now >= receive_at_) receive(level);
@@ -38,7 +38,7 @@ class HostUart {
     std::deque<uint16_t>
         received;  // as a PC's port gives them: without a stop bit too, but no break
     uint32_t framing_errors = 0, start_glitches = 0;
-    uint64_t first_cell = 0, last_cell = 0;  // clk at which the last burst began and ended
+    uint64_t first_cell = 0, last_cell = 0;  // cycles at which the last burst began and ended
 
  private:
     static constexpr uint64_t FRACTION = 1 << 16, NEVER = ~uint64_t(0);
@@ -68,7 +68,7 @@ class Bus {
         host.set_bit_time(bit_clk);
     }
 
-    // once a clk: nodes_driving and nodes_level are bit masks over the nodes
+    // once a cycle: nodes_driving and nodes_level are bit masks over the nodes
     void step(uint64_t now, uint32_t nodes_driving, uint32_t nodes_level) {
         const bool host_on = host.drives() && host_cut == Cut::none;
         const uint32_t on = nodes_driving & ~cut_mask_;
@@ -82,18 +82,19 @@ class Bus {
             was_several_ = false;
             level = true;
         }
-        bool heard = level;
+        bool at_receivers = level;
         if (now >= spike_start_) {
-            heard = !heard;
+            at_receivers = !at_receivers;
             if (now >= spike_end_) draw_spike(now);
         }
-        edges += heard != at_nodes;
-        at_nodes = heard;
-        bool at_host = host.drives() || (host_cut == Cut::none ? heard : host_cut == Cut::idle);
+        edges += at_receivers != at_nodes;
+        at_nodes = at_receivers;
+        bool at_host =
+            host.drives() || (host_cut == Cut::none ? at_receivers : host_cut == Cut::idle);
         if (reply_flips_armed_) at_host ^= reply_flip(now, at_host);
         host.step(now, at_host);
     }
-    bool heard_by(int node, bool own_driver) const {  // what a node's receiver puts out
+    bool level_at(int node, bool own_driver) const {  // the output of a node's receiver
         return own_driver ||
                (cut_mask_ >> node & 1 ? broken_mask_ >> node & 1 ? false : true : at_nodes);
     }

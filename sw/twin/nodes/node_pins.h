@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between the pins of a Verilated node and those of what is around it: vectors over its axes, one
-// word a machine, and its links.
+// Converts the pins of a Verilated node, which are vectors over its axes, to one word for each
+// machine and one for the peripherals, and back.
 #pragma once
 #include <cstdint>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One direction of the serial line between two nodes, idle high, characters of 8 bits without
-// parity: what the sender puts on it, pulled down by what disturbs it, random bytes at random times
-// among it, and a log of what arrives.
+// parity: the level of the sender, pulled low by disturbances and by random bytes at random times,
+// and a log of the bytes that arrive.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -20,7 +20,7 @@ class PeerLine {
     PeerLine(uint64_t seed, uint64_t stream, double clk_hz, double baud)
         : random_(seed, stream), clk_hz_(clk_hz), bit_(clk_hz / baud) {}
 
-    bool step(uint64_t now, bool tx) {  // once a clk; the level at the receiver
+    bool step(uint64_t now, bool tx) {  // once a cycle; returns the level at the receiver
         if (now >= disturb_at_) disturb(now);
         const bool level = (tx && disturbance_) || cut;
         if (now >= sample_at_)
@@ -29,19 +29,19 @@ class PeerLine {
             begin(now);
         return before_ = level;
     }
-    // Bytes onto the line beside its sender, from clk `now` on.
+    // Sends bytes beside the sender, from cycle `now` on.
     void put(const uint8_t* bytes, int count, uint64_t now) {
         if (count && !disturbs()) start(now + 1);
         pending_.insert(pending_.end(), bytes, bytes + count);
     }
-    // `rate` times a second some bytes of chance; 0 ends it.
+    // Sends some random bytes `rate` times a second; 0 ends it.
     void garbage(double rate, uint64_t now) {
         rate_ = rate;
         draw(now);
     }
 
-    bool cut = false;            // fault: the receiver hears an idle line
-    std::vector<uint8_t> heard;  // what a receiver makes of it, until taken
+    bool cut = false;               // fault: the receiver sees an idle line
+    std::vector<uint8_t> received;  // bytes that a receiver decodes, until they are taken
     uint64_t framing_errors = 0, garbage_bytes = 0;
 
  private:
@@ -80,33 +80,33 @@ class PeerLine {
         disturb_at_ = begun_ + uint64_t(++cell_ * bit_);
     }
     void begin(uint64_t now) {
-        place_ = 0;
+        bit_number_ = 0;
         byte_ = 0;
         first_ = now;
         sample_at_ = now + uint64_t(bit_ / 2);
     }
     void sample(bool level) {
-        if (place_ == 0 && level) {  // no start bit
+        if (bit_number_ == 0 && level) {  // no start bit
             sample_at_ = NEVER;
             return;
         }
-        if (place_ == CELLS - 1) {
+        if (bit_number_ == CELLS - 1) {
             if (level)
-                heard.push_back(byte_);
+                received.push_back(byte_);
             else
                 framing_errors++;
             sample_at_ = NEVER;
             return;
         }
-        if (place_) byte_ |= uint8_t(level << (place_ - 1));
-        sample_at_ = first_ + uint64_t((++place_ + 0.5) * bit_);
+        if (bit_number_) byte_ |= uint8_t(level << (bit_number_ - 1));
+        sample_at_ = first_ + uint64_t((++bit_number_ + 0.5) * bit_);
     }
 
     RandomSource random_;
     double clk_hz_, bit_, rate_ = 0;
     uint64_t disturb_at_ = NEVER, next_garbage_ = NEVER, begun_ = 0, sample_at_ = NEVER, first_ = 0;
     std::deque<uint8_t> pending_;
-    int cell_ = 0, place_ = 0;
+    int cell_ = 0, bit_number_ = 0;
     uint8_t byte_ = 0;
     bool disturbance_ = true, before_ = true;
 };

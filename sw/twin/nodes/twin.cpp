@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes (the RTL, Verilated), each with a machine at each axis, on one line with a host; and their
+// Nodes (the RTL, Verilated), each with a machine at each axis, and a host on one bus; and their
 // C interface.
 //
-// All nodes share clk. A clk is: every node takes its pins and sees the rising edge, then the
-// machine and the line take the node's outputs and set the pins for the next edge. One translation
-// unit with the Verilated code, so that all of it inlines.
+// All nodes share one clock. In a cycle every node takes its pins and sees the rising edge, then
+// the machines and the bus take the outputs of the nodes and set the pins for the next edge. One
+// translation unit with the Verilated code, so that all of it inlines.
 #include <algorithm>
 #include <deque>
 #include <memory>
@@ -23,7 +23,7 @@ constexpr uint32_t ALL_AXES = (1u << AXES) - 1;
 
 using Firmware = std::vector<uint32_t>;
 
-class Core {  // a Verilated node and its clk
+class Core {  // a Verilated node and its clock
  public:
     Core(unsigned address, const Firmware& firmware)
         : context_(new VerilatedContext), model_(new Vnode(context_.get())), pins(*model_->rootp) {
@@ -86,7 +86,7 @@ class Node {
                 set_peripheral_pins(pins, devices->levels());
             line_drives = pins.rs485_driver_enable;
             line_level = pins.rs485_tx;
-        } else {  // nothing is driven, the machines go on
+        } else {  // no power: the node drives nothing, the machines continue
             for (auto& machine : machines) machine->clk(now, DRIVE_IDLE);
             if (devices) devices->clk(now, PERIPHERAL_DRIVE_IDLE);
         }
@@ -120,7 +120,7 @@ class Node {
     std::vector<std::unique_ptr<Machine>> machines;
     std::unique_ptr<Devices> devices;
     bool line_drives = false,
-         line_level = true;  // its driver and what that is told, after this clk
+         line_level = true;  // its driver enable and level after this cycle
 
  private:
     void sense() {
@@ -153,7 +153,7 @@ class Twin {
         now++;
         uint32_t driving = 0, levels = 0;
         for (size_t n = 0; n < nodes.size(); n++) {
-            nodes[n]->step(now, bus.heard_by(int(n), nodes[n]->line_drives));
+            nodes[n]->step(now, bus.level_at(int(n), nodes[n]->line_drives));
             driving |= uint32_t(nodes[n]->line_drives) << n;
             levels |= uint32_t(nodes[n]->line_level) << n;
         }
@@ -172,12 +172,12 @@ class Twin {
     const Firmware firmware_;
 };
 
-// One node without a machine, fed with the levels of a line as they are: for campaigns of many
+// One node without a machine, driven by the levels of a bus as they are: for campaigns of many
 // damaged frames.
 class FrameBench {
  public:
     static constexpr uint64_t START_CLK =
-        2'000'000;  // the firmware starts; the learner's first work holds its answers up
+        2'000'000;  // the firmware starts; the first work of the calibration delays its answers
     FrameBench(unsigned address, const Firmware& firmware, double bit_clk)
         : core_(address, firmware), bit_clk_(bit_clk) {
         host_.set_bit_time(bit_clk);
@@ -294,22 +294,22 @@ void twin_bus_state(Twin* t, uint64_t* out) {
 void twin_estop(Twin* t, int node, int pressed) {
     t->nodes[size_t(node)]->press_estop(pressed != 0);
 }
-// The machine of an axis; machine_library.cpp has what can be done with it.
+// The machine of an axis; machine_library.cpp has its functions.
 void* twin_machine(Twin* t, int axis) { return &machine_of(t, axis); }
-// What stands around a node; devices_library.cpp has what can be done with it. The angle at each
+// The devices of a node; devices_library.cpp has their functions. The angle at each
 // cut is that of a worm table.
 void* twin_attach_devices(Twin* t, int node, const DevicesParameters* parameters, unsigned fitted,
                           uint64_t seed, int table) {
-    auto& around = t->nodes[size_t(node)]->devices;
-    around = std::make_unique<Devices>(*parameters, fitted, seed, 0x5EED00u + unsigned(node) * 16,
-                                       CLK_HZ);
+    auto& devices = t->nodes[size_t(node)]->devices;
+    devices = std::make_unique<Devices>(*parameters, fitted, seed, 0x5EED00u + unsigned(node) * 16,
+                                        CLK_HZ);
     if (table >= 0)
-        around->table_angle = [t, &machine = machine_of(t, table)] {
+        devices->table_angle = [t, &machine = machine_of(t, table)] {
             return machine.position(t->now);
         };
-    return around.get();
+    return devices.get();
 }
-// The serial line between two nodes, one direction; peer_line_* have what can be done with it.
+// One direction of the serial line between two nodes; its functions are peer_line_*.
 void* twin_join_peers(Twin* t, int from, int to, uint64_t seed, double baud) {
     t->peers.push_back({from, to, PeerLine(seed, 0x9EE2u + unsigned(from), CLK_HZ, baud)});
     return &t->peers.back().line;

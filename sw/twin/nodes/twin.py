@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The system without hardware: nodes as they ship (RTL and firmware), a machine at each axis, a
-line with a host at its end.
+"""The system without hardware: nodes as they ship (RTL and firmware), a machine at each axis, a bus
+with a host.
 
 Time is simulated: it passes in run, run_until_words and nowhere else, and the same seed gives the
-same run to the last bit.
-An axis is counted through all nodes: axis = place of the node * axes a node + axis of the node.
+same run to the last bit. An axis is counted through all nodes: axis = index of the node * axes per
+node + axis of the node.
 
     Twin(nodes=(1, 2))                                       two nodes of one axis each, each on a
                                                              stage of S0
@@ -239,7 +239,7 @@ class Twin:
             )
             for n, axis in enumerate(fitted)
         ]
-        self.around = [
+        self.node_devices = [
             self._attach_devices(n, node.devices or Devices(), seed, now)
             for n, node in enumerate(built)
             if any(node_parameters.get(name) for name in PERIPHERALS)
@@ -274,20 +274,20 @@ class Twin:
         self.handle = None
 
     def _attach_devices(
-        self, node: int, around: Devices, seed: int, now: Callable[[], int]
+        self, node: int, devices: Devices, seed: int, now: Callable[[], int]
     ) -> DevicesHandle:
-        if around.table is not None and around.table not in range(self.axes):
+        if devices.table is not None and devices.table not in range(self.axes):
             raise IndexError(
-                f"there is no axis {around.table} to be the table: there are {self.axes}"
+                f"there is no axis {devices.table} to be the table: there are {self.axes}"
             )
-        packed = pack_devices(around.parameters, self.library)
+        packed = pack_devices(devices.parameters, self.library)
         handle = self.library.twin_attach_devices(
             self.handle,
             node,
             ctypes.addressof(packed),
-            around.fitted,
+            devices.fitted,
             seed,
-            -1 if around.table is None else around.table,
+            -1 if devices.table is None else devices.table,
         )
         return DevicesHandle(self.library, handle, self.clk_hz, now)
 
@@ -300,6 +300,10 @@ class Twin:
     def run(self, seconds: float) -> None:
         """Let time pass."""
         self.library.twin_run(self.handle, max(0, round(seconds * self.clk_hz)))
+
+    def run_until_ready(self) -> None:
+        """Run until the firmware of all nodes has started, so that they answer on the bus."""
+        self.run(START_S)
 
     def run_until_words(self, count: int, timeout_s: float) -> int:
         """Run until the host has received `count` words, at most timeout_s; returns their count."""
@@ -429,9 +433,9 @@ class Twin:
 
     def devices(self, node: int = 0) -> DevicesHandle:
         """The devices of a node, see devices.DevicesHandle."""
-        if not self.around:
+        if not self.node_devices:
             raise LookupError("no node has devices: give a Node some, or build with PERIPHERALS")
-        return self.around[self.check_node(node)]
+        return self.node_devices[self.check_node(node)]
 
     def peer_line(self, sender: int, receiver: int) -> PeerLineHandle:
         """One direction of the serial line between two nodes; see devices.PeerLineHandle."""
@@ -474,18 +478,18 @@ class Twin:
             self.clear(fault, where)
 
     def _fault(self, fault: str, where: int | str, on: bool, level: bool) -> None:
-        place = -1 if isinstance(where, str) else where
+        index = -1 if isinstance(where, str) else where
         if fault == "estop":
-            self.library.twin_estop(self.handle, self.check_node(place), on)
+            self.library.twin_estop(self.handle, self.check_node(index), on)
         elif fault == "line_cut":
-            node = -1 if where == "host" else self.check_node(place)
+            node = -1 if where == "host" else self.check_node(index)
             self.library.twin_cut(
                 self.handle, node, CUTS["none" if not on else "idle" if level else "break"]
             )
         elif on:
-            self.machine(place).inject(fault, level)
+            self.machine(index).inject(fault, level)
         else:
-            self.machine(place).clear(fault)
+            self.machine(index).clear(fault)
 
     # traces
 

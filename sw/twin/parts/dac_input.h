@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The 16-bit bipolar converter that a node drives: data in at rising sclk while cs_n is low, MSB
+// The 16-bit bipolar DAC that a node drives: data in at rising sclk while cs_n is low, MSB
 // first; rising cs_n loads the last 16 bits. Offset binary: 32768 = 0 V. AD5542A class.
 #pragma once
 #include <cstdint>

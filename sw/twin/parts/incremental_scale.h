@@ -35,13 +35,13 @@ class IncrementalScale {
                z_ * ENCODER_Z;
     }
     double way_to_change(double position, double velocity) const {  // along the motion, m
-        double way = velocity > 0 ? double(counts_ + 1) * count_ - position
-                                  : position - double(counts_) * count_ + hysteresis_;
+        double distance = velocity > 0 ? double(counts_ + 1) * count_ - position
+                                       : position - double(counts_) * count_ + hysteresis_;
         for (const double edge : {index_ + rise_, index_ + width_ + rise_}) {
             const double ahead = velocity > 0 ? edge - position : position - edge;
-            if (ahead > 0 && ahead < way) way = ahead;
+            if (ahead > 0 && ahead < distance) distance = ahead;
         }
-        return std::fmax(way, 0);
+        return std::fmax(distance, 0);
     }
     // the clk at which a body that moves on like this changes a level
     uint64_t next_change(uint64_t now, double position, double velocity, double clk_hz) const {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Grating interferometer of one axis, from the place of the table to the pins of the node: sine and
-// cosine through two converters that sample together, and the comparators' quadrature levels with
-// their spikes.
+// Grating interferometer of one axis, from the position of the table to the pins of the node: sine
+// and cosine through two converters that sample together, and the comparators' quadrature levels
+// with their spikes.
 //
 //   phase  = 2 pi (position + scale error - grating_offset) / period          sine = sin(phase)
 //   cosine = cos(phase), with their errors:

@@ -5,8 +5,10 @@
 //   hysteresis  Prandtl-Ishlinskii: y = w0 u + w sum play(u, r_i); the weights follow from the
 //   range, which the full loop reaches, and
 //               the width of that loop at its middle
-//   creep       log-like: relaxations two a decade from 10 ms to 1000 s, together `creep` of the
-//   way a decade mode        x'' + 2 d w x' + w^2 x = w^2 y
+//   creep       nearly logarithmic: two relaxations per decade from 10 ms to 1000 s, together
+//   `creep` of
+//               the travel per decade
+//   mode        x'' + 2 d w x' + w^2 x = w^2 y
 #pragma once
 #include <array>
 #include <cmath>
@@ -25,30 +27,30 @@ class Piezo {
         natural_ = 2 * M_PI * p.piezo_mode;
         damping_ = p.piezo_mode_damping;
         mass_ = p.piezo_mass;
-        double width = 0, way = 0;  // of the full loop, for a weight of 1
+        double width = 0, travel = 0;  // of the full loop, for a weight of 1
         for (int i = 0; i < PLAYS; i++) {
             width += 2 * std::fmin(radius(i), 1 - radius(i));
-            way += 2 * (1 - radius(i));
+            travel += 2 * (1 - radius(i));
         }
         weight_ = p.piezo_hysteresis * range_ / width;
-        direct_ = (range_ - weight_ * way) / 2;
+        direct_ = (range_ - weight_ * travel) / 2;
     }
-    void step(double wanted, double dt) {  // wanted: -1..1 of the amplifier's swing
+    void step(double demanded, double dt) {  // demanded: -1..1 of the amplifier's swing
         const double most = slew_ * dt;
-        drive += std::fmax(-most, std::fmin(most, wanted - drive));
-        double way = direct_ * drive;
+        drive += std::fmax(-most, std::fmin(most, demanded - drive));
+        double travel = direct_ * drive;
         for (int i = 0; i < PLAYS; i++) {
             play_[i] = std::fmax(drive - radius(i), std::fmin(drive + radius(i), play_[i]));
-            way += weight_ * play_[i];
+            travel += weight_ * play_[i];
         }
         double crept = 0, tau = SHORTEST;
         for (double& state : crept_) {
-            state += (creep_ * way - state) * -std::expm1(-dt / tau);
+            state += (creep_ * travel - state) * -std::expm1(-dt / tau);
             crept += state;
             tau *= RATIO;
         }
         const double acceleration =
-            natural_ * natural_ * (way + crept - position) - 2 * damping_ * natural_ * velocity;
+            natural_ * natural_ * (travel + crept - position) - 2 * damping_ * natural_ * velocity;
         velocity += dt * acceleration;
         position += dt * velocity;
         reaction = -mass_ * acceleration;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Error of a scale along its travel: what it shows at a place, less that place.
+// Error of a scale along its travel: the indicated position minus the true position.
 //
 //   error = linear x + cyclic sin(2 pi x / pitch) + a random walk: independent normal steps every
 //   WALK_STEP, straight lines between
