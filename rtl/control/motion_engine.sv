@@ -125,19 +125,20 @@ module motion_engine #(
     logic [23:0] elapsed, period;
 
     // what the axes show
-    wire [48*AXES-1:0] seen_position;
-    wire [24*AXES-1:0] seen_elapsed;
-    wire [7*AXES-1:0] seen, levels;
-    wire [AXES-1:0] asked, gains;
-    wire  [ 7:0] gains_all = 8'(gains), asked_all = 8'(asked);
-    wire  [23:0] elapsed_now = tick ? '0 : elapsed == '1 ? elapsed : elapsed + 1'b1;
+    localparam int SEEN = 88;  // bits that an axis shows
+    wire  [SEEN*AXES-1:0] seen;
+    wire  [   SEEN*8-1:0] of_eight = (SEEN * 8)'(seen);
+    wire  [   SEEN*4-1:0] of_four = axis[2] ? of_eight[SEEN*4+:SEEN*4] : of_eight[0+:SEEN*4];
+    wire  [   SEEN*2-1:0] of_two = axis[1] ? of_four[SEEN*2+:SEEN*2] : of_four[0+:SEEN*2];
+    wire  [     SEEN-1:0] of_axis = axis[0] ? of_two[SEEN+:SEEN] : of_two[0+:SEEN];
+    wire  [         23:0] elapsed_now = tick ? '0 : elapsed == '1 ? elapsed : elapsed + 1'b1;
 
     // the lines in work: fetched, and its operand is being read; then the operand is there; then it
     // is added
-    wire  [35:0] code;
-    wire  [ 7:0] action_e;
-    logic [ 3:0] source;  // of the operand: 0 memory or nothing
-    logic        reads;  // the operand is in memory
+    wire  [         35:0] code;
+    wire  [          7:0] action_e;
+    logic [          3:0] source;  // of the operand: 0 memory or nothing
+    logic                 reads;  // the operand is in memory
     logic [5:0] word, word_e;
     logic with_acc, sign, sign_e;
     logic [3:0] effect, effect_e;
@@ -300,16 +301,16 @@ module motion_engine #(
                 shift[n]
             }),
             .done(axis == 3'(n) ? done : '0),
-            .seen_position(seen_position[48*n+:48]),
-            .seen_elapsed(seen_elapsed[24*n+:24]),
-            .seen(seen[7*n+:7]),
-            .levels(levels[7*n+:7]),
-            .asked(asked[n]),
-            .gains(gains[n])
+            .seen_position(seen[SEEN*n+:48]),
+            .seen_elapsed(seen[SEEN*n+48+:24]),
+            .seen(seen[SEEN*n+72+:7]),
+            .levels(seen[SEEN*n+79+:7]),
+            .asked(seen[SEEN*n+86]),
+            .gains(seen[SEEN*n+87])
         );
+        assign waits[n] = seen[SEEN*n+86];
     end
 
-    assign waits = asked;
 
     wire unused = &{1'b0, code, wide[0], requested[6], read_word, write_word, write_at};
 
@@ -377,12 +378,7 @@ module motion_engine #(
         end
 
         // the axis
-        axis_position <= seen_position[48*axis+:48];
-        axis_elapsed  <= seen_elapsed[24*axis+:24];
-        requested     <= seen[7*axis+:7];
-        level         <= levels[7*axis+:7];
-        axis_asked    <= asked_all[axis];
-        axis_gains    <= gains_all[axis];
+        {axis_gains, axis_asked, level, requested, axis_elapsed, axis_position} <= of_axis;
 
         // time
         elapsed <= elapsed_now;
