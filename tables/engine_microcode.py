@@ -106,7 +106,7 @@ CONSTANTS = {
 }
 FILTER_SETTINGS = ("b0", "b1", "b2", "c1", "c2", "in_use")  # one bank of words per filter
 FILTER_STATE = ("cut_off", "x1", "x2", "y1", "y2", "known", "filtering")
-FILTER = {name: 1 + n for n, name in enumerate(FILTER_SETTINGS)} | {
+FILTER = {name: n for n, name in enumerate(FILTER_SETTINGS)} | {
     name: 8 + n for n, name in enumerate(FILTER_STATE)
 }
 
@@ -121,15 +121,10 @@ def addresses() -> dict[str, int]:
     found = {name: n for n, name in enumerate(RAMP)} | {name: 8 + n for n, name in enumerate(STOP)}
     low = [6, 7, 14, 15, *range(16, 48)]  # what the engine writes is here
     high = [*range(48, 64), *(4 * n + 3 for n in range(16, 32))]
-    free = [*low[len(STATE) + len(SCRATCH) :], *high]
-    # a setting is not written while a word with the same last bits is read, and a line that reads
-    # nothing has the number 0 there
-    changing = [at for at in free if number_of(at) % 8][: len(SETTINGS)]
-    constant = [at for at in free if at not in changing]
-    names = [*STATE, *SCRATCH, *SETTINGS, *CONSTANTS]
-    if len(STATE) + len(SCRATCH) > len(low) or len(CONSTANTS) > len(constant):
+    written = [*STATE, *SCRATCH]
+    names, free = [*written, *SETTINGS, *CONSTANTS], [*low, *high]
+    if len(written) > len(low) or len(names) > len(free):
         raise ValueError(f"{len(names)} words for {len(low)} and {len(high)} addresses")
-    free = [*low[: len(STATE) + len(SCRATCH)], *changing, *constant]
     return found | dict(zip(names, free)) | {name: 128 + n for name, n in FILTER.items()}
 
 

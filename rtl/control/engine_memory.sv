@@ -28,9 +28,9 @@ module engine_memory #(
     initial begin
         for (int n = 0; n < AXES * WORDS; n++) words[n] = '0;
         for (int n = 0; n < AXES; n++) begin
-            words[n*WORDS+40] = 72'h1;  // one
-            words[n*WORDS+48] = 72'h100;  // byte
-            words[n*WORDS+56] = 72'h80;  // half_byte
+            words[n*WORDS+59] = 72'h1;  // one
+            words[n*WORDS+60] = 72'h100;  // byte
+            words[n*WORDS+61] = 72'h80;  // half_byte
             words[n*WORDS+62] = 72'h10000;  // two16
             words[n*WORDS+63] = 72'h100000;  // two20
             words[n*WORDS+67] = 72'h800000;  // half_step

@@ -40,7 +40,9 @@ module engine_settings #(
     logic [ 1:0] filter;
     logic [63:0] value;
 
-    wire         settles = waits && !write && operand[2:0] != number[2:0];
+    wire         reads_memory = operand[6:4] != 3'b111;
+    wire         may_be_read = reads_memory && operand[2:0] == number[2:0];
+    wire         settles = waits && !write && !may_be_read;
     wire  [ 7:0] plain = {2'd0, number[5:0]};
     wire  [ 7:0] above = {2'b01, number[3:0], 2'b11};
     wire  [ 7:0] banked = {2'b10, filter, number[3:0]};
@@ -57,7 +59,7 @@ module engine_settings #(
         if (rst) waits <= 1'b0;
     end
 
-    wire unused = &{1'b0, address, operand[6:3]};
+    wire unused = &{1'b0, address, operand[3]};
 
 `ifdef FORMAL
     logic        past = 1'b0;

@@ -3,6 +3,8 @@
 cycle, clk(...) then advances one cycle.
 """
 
+OUTSIDE = 0x70  # the first number of what is not in memory
+
 
 def address_of(number, filter):
     """The address of a setting in the memory of its axis."""
@@ -19,7 +21,7 @@ class EngineSettings:
         """(address, value) of the word that is written in this cycle, or None."""
         if write:
             return write_at, word
-        if self.waiting is None or operand % 8 == self.waiting[1] % 8:
+        if self.waiting is None or operand < OUTSIDE and operand % 8 == self.waiting[1] % 8:
             return None
         axis, number, filter, value = self.waiting
         at = address_of(number, filter) % (1 << self.word_w)

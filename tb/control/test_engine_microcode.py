@@ -9,7 +9,16 @@ from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
 from tables import engine_microcode
-from tables.engine_microcode import LINES, assembled, codes, missing, parsed, worst
+from tables.engine_microcode import (
+    LINES,
+    OPERANDS,
+    assembled,
+    codes,
+    missing,
+    parsed,
+    successors,
+    worst,
+)
 from tb.bench import run
 
 
@@ -65,3 +74,29 @@ def test_a_jump_does_not_depend_on_a_sign_that_is_not_known_yet():
 def test_a_wrong_line_is_refused(text):
     with pytest.raises(ValueError):
         parsed(text)
+
+
+def longest_wait(lines, bits):
+    """The most cycles in a row in which the engine writes, or reads a word whose number ends with
+    these bits. A line reads while the line two before it writes.
+    """
+    follow = successors(lines)
+    reads = [OPERANDS[x.operand] < 0x70 and OPERANDS[x.operand] % 8 == bits for x in lines]
+    memory = {}
+
+    def run(a, b, c):
+        if not (lines[a].word or reads[c]):
+            return 0
+        if (a, b, c) not in memory:
+            memory[a, b, c] = None  # a loop in which nothing can be written ends in an error
+            memory[a, b, c] = 1 + max(run(b, c, d) for d in follow[c])
+        return memory[a, b, c]
+
+    idle = next(n for n, line in enumerate(lines) if line.label == "idle")
+    pairs = [(a, b) for a in range(idle, len(lines)) for b in follow[a]]
+    return max(run(a, b, c) for a, b in pairs for c in follow[b])
+
+
+def test_a_setting_is_written_within_10_cycles():
+    lines = assembled()
+    assert max(longest_wait(lines, bits) for bits in range(8)) < 10

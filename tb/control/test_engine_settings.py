@@ -13,10 +13,8 @@ from tables.engine_microcode import (
     ADDRESS,
     BANK,
     FILTER,
-    FILTER_SETTINGS,
     OPERANDS,
     RAMP,
-    SETTINGS,
     STOP,
 )
 from tb.bench import run, start
@@ -89,7 +87,7 @@ async def a_setting_waits_while_the_engine_writes_or_reads_its_word(dut):
 async def random_cycles_match_the_model(dut):
     settings = await Settings(dut).reset()
     word_w = settings.model.word_w
-    numbers = [*range(0x50), *(range(0x50, 0x57) if word_w == 8 else ())]
+    numbers = [*range(0x50), *(range(0x50, 0x56) if word_w == 8 else ())]
     for _ in range(4000):
         setting = None
         if settings.model.waiting is None and random.random() < 0.3:
@@ -118,9 +116,6 @@ def test_the_addresses_are_those_of_the_microcode():
     for name, at in ADDRESS.items():
         if name in OPERANDS and OPERANDS[name] < 0x50:
             assert address_of(OPERANDS[name], 0) == at
-    assert not any(
-        OPERANDS[name] % 8 == OPERANDS["0"] % 8 for name in (*SETTINGS, *FILTER_SETTINGS)
-    )
     for n, name in enumerate(BANK):  # a word and its shared name end with the same three bits
         assert OPERANDS[name] % 8 == OPERANDS[RAMP[n]] % 8 == OPERANDS[STOP[n]] % 8
     for name, n in FILTER.items():
