@@ -76,7 +76,7 @@ module engine_settings #(
             if (waits) assert (value == owed_value);
             if (write) assert (write_out && write_out_at == write_at && word_out == word);
             if (write_out && !write) begin
-                assert (owed && operand != number);
+                assert (owed && !(reads_memory && operand == number));
                 assert (word_out[63:0] == owed_value && word_out[71] == owed_value[63]);
             end
             cover (write_out && !write && $past(waits, 2));
