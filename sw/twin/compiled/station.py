@@ -346,12 +346,15 @@ class Edm:
 
 class Station(FakeNode):
     """The node, powered up. `absent` names the devices that are missing: eeprom, keypad, display.
-    `peripherals_built` is the register peripherals.built, `seed` that of the damage by power cuts.
+    `peripherals_built` is the register peripherals.built, `seed` is that of the damage by power
+    cuts.
     """
 
     CLK_HZ, POLL_CLK = CLK_HZ, CLK_HZ // 2000
 
-    def __init__(self, absent: Sequence[str] = (), peripherals_built: int = 63, seed: int = 0) -> None:
+    def __init__(
+        self, absent: Sequence[str] = (), peripherals_built: int = 63, seed: int = 0
+    ) -> None:
         self.source = random.Random(seed)
         self.eeprom, self.keypad, self.display, self.edm, self.bus = (
             Eeprom(),

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// engine_regions -- what the lines of engine_microcode belong to, for a proof.
+//
+// latency   0 cycles, combinational
+// rate      one line per cycle
+// model     tb/control/engine_regions.py, equal for every line
+// made      by tables/engine_microcode.py, not to be edited
+`default_nettype none
+
+module engine_regions (
+    input wire [9:0] line,  // number of a line
+    output logic [2:0] region  // 0 idle, 1 idle and service, 2 service, 3 to the next axis, 4 begin
+);
+    always_comb begin
+        region = 3'd0;
+        if (line >= 10'd46 && line <= 10'd46) region = 3'd4;  // enter
+        if (line >= 10'd47 && line <= 10'd52) region = 3'd2;  // serve
+        if (line >= 10'd56 && line <= 10'd66) region = 3'd1;  // shared
+        if (line >= 10'd94 && line <= 10'd100) region = 3'd1;  // shared
+        if (line >= 10'd117 && line <= 10'd636) region = 3'd2;  // serve
+        if (line >= 10'd637 && line <= 10'd640) region = 3'd3;  // leave
+    end
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model of rtl/control/engine_regions.sv: region_of(line)."""
+
+from tables.engine_microcode import REGIONS, assembled, regions
+
+FOUND = [REGIONS.index(name) for name in regions(assembled())]
+
+
+def region_of(line):
+    """The number of the region; lines after the last one are idle."""
+    return FOUND[line] if line < len(FOUND) else 0
