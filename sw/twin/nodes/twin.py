@@ -52,7 +52,7 @@ else:
 CLK_HZ = 2_400_000
 START_S = 0.2  # until the soft core of a node with one axis listens, with a margin of 45 ms
 DRIVES = ("HAS_BRIDGE", "HAS_STEPPER", "HAS_DAC", "HAS_FINE_STAGE")  # of rtl/node.sv
-PERIPHERALS = (
+PERIPHERALS = (  # in the order of the register peripherals.built
     "HAS_I2C",
     "HAS_PS2",
     "HAS_PEER",
