@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
-from tools import ROOT
+from tools import ROOT, exit_code
 
 PACKAGES = {
     "moire": "sw/host/moire",
@@ -194,10 +194,7 @@ def problems() -> list[str]:
 
 
 def main() -> int:
-    found = problems()
-    for row in found:
-        print(row)
-    return 1 if found else 0
+    return exit_code(problems())
 
 
 if __name__ == "__main__":

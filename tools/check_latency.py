@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from tables import modules
-from tools import ROOT
+from tools import ROOT, exit_code
 
 NO_CLAIM = re.compile(r"(see|none)\b")
 
@@ -54,10 +54,7 @@ def problems() -> list[str]:
 
 
 def main() -> int:
-    found = problems()
-    for row in found:
-        print(row)
-    return 1 if found else 0
+    return exit_code(problems())
 
 
 if __name__ == "__main__":

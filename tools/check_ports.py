@@ -11,7 +11,7 @@ import re
 import sys
 from pathlib import Path
 
-from tools import ROOT
+from tools import ROOT, exit_code
 
 NEEDS_NONE = {"clk", "rst"}
 DECLARATION = re.compile(r"\s*(?:input|output|inout|parameter)\b")
@@ -46,10 +46,7 @@ def problems() -> list[str]:
 
 
 def main() -> int:
-    found = problems()
-    for row in found:
-        print(f"{row} states no unit and no meaning")
-    return 1 if found else 0
+    return exit_code(f"{row} states no unit and no meaning" for row in problems())
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from tools import ROOT
+from tools import ROOT, exit_code
 
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -165,14 +165,11 @@ def main(arguments: list[str] | None = None) -> int:
     files = {
         path.stem: path for path in (ROOT / "tb").rglob("*.py") if not path.name.startswith("test_")
     }
-    found = [
-        f"{path}:{line}: {name} {what}"
+    return exit_code(
+        f"{path}:{line}: {name} {what}".removeprefix(f"{ROOT}/")
         for path in chosen or sorted((ROOT / "tb").rglob("test_*.py"))
         for line, name, what in faults(path, files)
-    ]
-    for line in found:
-        print(line.removeprefix(f"{ROOT}/"))
-    return int(bool(found))
+    )
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
-from tools import ROOT
+from tools import ROOT, exit_code
 
 
 def problems(packages: Sequence[str] = ()) -> list[str]:
@@ -25,10 +25,7 @@ def problems(packages: Sequence[str] = ()) -> list[str]:
 
 
 def main() -> int:
-    found = problems(sys.argv[1:])
-    for row in found:
-        print(row)
-    return 1 if found else 0
+    return exit_code(problems(sys.argv[1:]))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from cocotb.triggers import FallingEdge
 
 from moire.made.registers import BY_NAME
 from tb import bench
+from twin.nodes.twin import PERIPHERALS
 
 INPUTS = (
     "i2c_scl",
@@ -23,15 +24,7 @@ INPUTS = (
     "sensor_rx",
     "edm_status",
 )
-PERIPHERALS = (  # in the order of the register `built`
-    "HAS_I2C",
-    "HAS_PS2",
-    "HAS_PEER",
-    "HAS_ANGLE_SENSOR",
-    "HAS_DISPLAY",
-    "HAS_STATUS_INPUTS",
-)
-IDLE = [  # in the same order
+IDLE = [  # in the order of PERIPHERALS, which is that of the register `built`
     dict(i2c_scl_low=0, i2c_sda_low=0),
     dict(keyboard_clock_low=0, keyboard_data_low=0, edm_clock_low=0, edm_data_low=0),
     dict(peer_tx=1),

@@ -53,7 +53,7 @@ CLK_HZ = 2_400_000
 START_S = 0.05  # until the soft core of a node with one axis listens, with a margin of 30 ms
 DRIVES = ("HAS_BRIDGE", "HAS_STEPPER", "HAS_DAC", "HAS_FINE_STAGE")  # of rtl/node.sv
 ALL_AXES = 255  # a mask of axes of rtl/node.sv: bit n is axis n
-PERIPHERALS = (
+PERIPHERALS = (  # in the order of the register peripherals.built
     "HAS_I2C",
     "HAS_PS2",
     "HAS_PEER",

@@ -26,8 +26,8 @@ def last_command(arguments: list[str]) -> list[str]:
     return arguments
 
 
-class Bash(BashComplete):
-    """Completes the last command of a chain in bash."""
+class OfAChain(ShellComplete):
+    """Completes the last command of a chain."""
 
     def get_completion_args(self) -> tuple[list[str], str]:
         """The arguments of the last command, and the word that is being typed."""
@@ -35,22 +35,16 @@ class Bash(BashComplete):
         return last_command(arguments), incomplete
 
 
-class Zsh(ZshComplete):
-    """Completes the last command of a chain in zsh."""
-
-    def get_completion_args(self) -> tuple[list[str], str]:
-        """The arguments of the last command, and the word that is being typed."""
-        arguments, incomplete = super().get_completion_args()
-        return last_command(arguments), incomplete
+class Bash(OfAChain, BashComplete):
+    """The same in bash."""
 
 
-class Fish(FishComplete):
-    """Completes the last command of a chain in fish."""
+class Zsh(OfAChain, ZshComplete):
+    """The same in zsh."""
 
-    def get_completion_args(self) -> tuple[list[str], str]:
-        """The arguments of the last command, and the word that is being typed."""
-        arguments, incomplete = super().get_completion_args()
-        return last_command(arguments), incomplete
+
+class Fish(OfAChain, FishComplete):
+    """The same in fish."""
 
 
 for shell in (Bash, Zsh, Fish):

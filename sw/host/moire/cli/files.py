@@ -4,7 +4,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from moire.errors import BadFile, MoireError
 
@@ -35,6 +35,11 @@ def read_json(file: str) -> Any:
         return json.loads(read_text(file))
     except ValueError as error:
         raise BadFile(f"the file {file} is no JSON: {error}") from None
+
+
+def are_texts(content: Any) -> TypeGuard[dict[str, str]]:
+    """Whether this content of a JSON file is an object of names and texts."""
+    return isinstance(content, dict) and all(isinstance(text, str) for text in content.values())
 
 
 def write_text(file: str, text: str) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The options that every command takes."""
+"""The options that every command takes, and one that several share."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +9,7 @@ from click.core import ParameterSource
 
 from moire.bus.protocol import ADDRESSES
 from moire.bus.transport import BAUD, PARITIES
-from moire.cli.values import ADDRESS, AXIS, FILE, POSITIVE, TEXT, Name
+from moire.cli.values import ADDRESS, AXIS, FILE, POSITIVE, TEXT, WAITING_TIME, Name
 
 OF_THE_PORT = ("port", "baud", "parity", "record")
 OF_THE_CALL = (*OF_THE_PORT, "json")
@@ -83,4 +83,11 @@ COMMON = (
         is_flag=True,
         help="Print one JSON object per line for each command, and errors as JSON too.",
     ),
+)
+FOR = click.option(
+    "--for",
+    "duration",
+    type=WAITING_TIME,
+    metavar="TIME",
+    help="The command ends after this time. Without it Ctrl-C ends the command.",
 )

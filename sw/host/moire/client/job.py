@@ -27,6 +27,7 @@ from moire.client.indexing_table import (
 )
 from moire.client.names import CAUSE_CODES, bit_names, code_name, descriptions
 from moire.client.node import Node
+from moire.client.nonvolatile import cause_of, when_written
 from moire.errors import BadFile, MoireError, MotionFailed, OutOfRange
 from moire.made.bus_tables import CAUSES, FAULTS, JOB_ACTIONS, JOB_FLAGS, JOB_STATES
 
@@ -203,18 +204,16 @@ class Job:
 
     def ready(self) -> str:
         """Waits until the EEPROM is not being read or written; returns how that ended."""
-        transport = self.node.bus.transport
-        began = transport.now()
-        reply = self.node.request("job_stations")
-        while reply["writing"] and transport.now() - began < SAVE_S:
-            transport.wait(self.node.bus.poll_s)
-            reply = self.node.request("job_stations")
-        return "eeprom_busy" if reply["writing"] else code_name(CAUSES, reply["ended"], "cause")
+        return self._stored()[0]
+
+    def _stored(self) -> tuple[str, dict[str, int]]:
+        """How the work of the EEPROM ended, and what the node reports of the list there."""
+        reply = when_written(self.node, "job_stations", SAVE_S)
+        return cause_of(reply["writing"], reply["ended"]), reply
 
     def read(self) -> StationList:
         """The station list in the EEPROM."""
-        cause = self.ready()
-        reply = self.node.request("job_stations")
+        cause, reply = self._stored()
         angles = tuple(
             arcsec(self.node.request("job_angle", station=station)["angle"])
             for station in range(reply["stations"])

@@ -39,6 +39,24 @@ class SavedState:
         return state + "; one copy of them was damaged" * self.damaged
 
 
+def when_written(node: Node, operation: str, timeout_s: float) -> dict[str, int]:
+    """The reply to an operation that reports on the EEPROM, as soon as that is not being read or
+    written; after timeout_s seconds the reply as it is, with `writing`.
+    """
+    transport = node.bus.transport
+    began = transport.now()
+    reply = node.request(operation)
+    while reply["writing"] and transport.now() - began < timeout_s:
+        transport.wait(node.bus.poll_s)
+        reply = node.request(operation)
+    return reply
+
+
+def cause_of(writing: int, code: int) -> str:
+    """The cause with which the work of the EEPROM ended: that of the code, unless it goes on."""
+    return "eeprom_busy" if writing else code_name(CAUSES, code, "cause")
+
+
 class SavedSettings:
     """The saved values of a node."""
 
@@ -47,13 +65,8 @@ class SavedSettings:
 
     def state(self) -> SavedState:
         """The state, as soon as the EEPROM is not being read or written."""
-        transport = self.node.bus.transport
-        began = transport.now()
-        reply = self.node.request("saved_settings")
-        while reply["writing"] and transport.now() - began < SAVE_TIMEOUT_S:
-            transport.wait(self.node.bus.poll_s)
-            reply = self.node.request("saved_settings")
-        cause = "eeprom_busy" if reply["writing"] else code_name(CAUSES, reply["cause"], "cause")
+        reply = when_written(self.node, "saved_settings", SAVE_TIMEOUT_S)
+        cause = cause_of(reply["writing"], reply["cause"])
         return SavedState(cause, bool(reply["damaged"]), reply["generation"], reply["values"])
 
     def save(self) -> SavedState:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from moire.cli.files import read_json, write_json
+from moire.cli.files import are_texts, read_json, write_json
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import FILE, TEXT, Name
@@ -190,7 +190,7 @@ def read_parameters(file: str) -> tuple[dict[str, str], list[int]]:
     """The parameters in a file as text, and the points of its segment table in counts."""
     content = read_json(file)
     texts = content.get("parameters") if isinstance(content, dict) else None
-    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+    if not are_texts(texts):
         raise BadFile(
             f"the file {file} holds no parameters: it must look like "
             '{"parameters": {"velocity": "5mm/s"}}'

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from moire.cli.files import read_json, write_json
+from moire.cli.files import are_texts, read_json, write_json
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import FILE, TEXT, Name
@@ -92,7 +92,7 @@ def save(call: Call, file: str) -> None:
 def load(call: Call, file: str) -> None:
     """The file need not have all settings."""
     texts = read_json(file)
-    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+    if not are_texts(texts):
         raise BadFile(f"{file} has no settings: it must be a JSON object of names and texts")
     loaded = Settings(call.node).load(texts)
     call.say({"file": file, "settings": len(loaded)}, f"{len(loaded)} settings from {file}")

@@ -11,9 +11,10 @@ import click
 
 from moire.bus.gateway import Gateway
 from moire.bus.twin_port import MACHINES, open_twin
+from moire.cli.options import FOR
 from moire.cli.parser import Several, moire
 from moire.cli.session import Call
-from moire.cli.values import ADDRESS, FILE, TEXT, WAITING_TIME, WHOLE, Name
+from moire.cli.values import ADDRESS, FILE, TEXT, WHOLE, Name
 from moire.errors import OutOfRange, PortError
 
 RFC2217_PORT, TCP_PORT = 2217, 2218
@@ -70,13 +71,7 @@ RFC2217_PORT, TCP_PORT = 2217, 2218
     metavar="N",
     help="The seed of all that is random in the simulation. The default is 1.",
 )
-@click.option(
-    "--for",
-    "duration",
-    type=WAITING_TIME,
-    metavar="TIME",
-    help="The command ends after this time. Without it Ctrl-C ends the command.",
-)
+@FOR
 def twin(
     call: Call,
     machine: str,

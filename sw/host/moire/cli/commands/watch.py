@@ -7,6 +7,7 @@ from math import inf
 
 import click
 
+from moire.cli.options import FOR
 from moire.cli.parser import moire
 from moire.cli.session import Call
 from moire.cli.values import WAITING_TIME
@@ -25,13 +26,7 @@ EVERY_S = 0.2
     metavar="TIME",
     help=f"The time from row to row, with its unit. The default is {EVERY_S}s.",
 )
-@click.option(
-    "--for",
-    "duration",
-    type=WAITING_TIME,
-    metavar="TIME",
-    help="The command ends after this time. Without it Ctrl-C ends the command.",
-)
+@FOR
 def watch(call: Call, every: Fraction | None, duration: Fraction | None) -> None:
     """Polls between the rows too, so that the watchdog of the node leaves the drive on."""
     axis, step_s = call.axis, float(every or EVERY_S)
