@@ -57,6 +57,25 @@ def test_the_queue_lasts_16_ms_and_150_000_cycles_and_a_piece():
     assert [segment[4] for segment in axis.pushed] == [0] * (len(axis.pushed) - 1) + [1]
 
 
+def test_a_busy_soft_core_does_not_starve_a_short_move():
+    """The events of a short move are a tick apart, and its queue has room for 16 segments. The
+    firmware feeds them only every 10 ms, which is four times as rarely as at 60 MHz.
+    """
+    machine = homed()
+    axis, target = machine.axes[0], 0
+    for step in (*range(50, 4000, 350), 9000, 22_000, PERIOD, 3 * PERIOD):
+        target += step
+        machine.ask("move", axis=0, target=target)
+        for _ in range(500):
+            if not axis.player.moving:
+                break
+            for _ in range(40):
+                axis.tick()
+            machine.poll()
+        assert axis.faults == 0 and axis.target == target, f"a move of {step}"
+        assert finish(machine) == "ok"
+
+
 # another target in flight
 
 

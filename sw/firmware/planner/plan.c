@@ -93,7 +93,35 @@ bool plan_walk(const struct plan* plan, struct planner_progress* at, uint8_t* ne
     return true;
 }
 
+// Appends a tick of this velocity to a segment of one or two ticks, if the jerk fits into 32 bits.
+static bool append(struct planner_segment* piece, int64_t velocity) {
+    if (piece->ticks == 1) {
+        piece->acceleration = velocity - piece->velocity;
+        piece->jerk = 0;
+    } else {
+        const int64_t jerk = velocity - piece->velocity - 2 * piece->acceleration;
+        if ((int32_t)jerk != jerk) return false;
+        piece->jerk = (int32_t)jerk;
+    }
+    piece->ticks++;
+    return true;
+}
+
 bool planner_take_up_to(struct plan* plan, struct planner_segment* piece, bool* last,
                         uint32_t longest) {
-    return plan_walk(plan, &plan->at, &plan->next, piece, last, longest);
+    if (!plan_walk(plan, &plan->at, &plan->next, piece, last, longest)) return false;
+    if (plan->stepped) return true;
+    if (longest > PLANNER_SHORT_PIECE) longest = PLANNER_SHORT_PIECE;
+    while (piece->ticks < longest && !*last) {
+        struct planner_progress at = plan->at;
+        struct planner_segment tick;
+        uint8_t next = plan->next;
+        bool ends;
+        plan_walk(plan, &at, &next, &tick, &ends, 1);
+        if (!append(piece, tick.velocity)) break;
+        plan->at = at;
+        plan->next = next;
+        *last = ends;
+    }
+    return true;
 }
