@@ -218,17 +218,16 @@ class Stage:
         return self.together(lambda name, axis: axis.request("home"), self.axes)
 
     def both(self, name: str) -> tuple[int, int, float]:
-        """(counts of the scale, counts of the node, true position in um) after the table has
-        stopped, which is when two successive polls give the same counts.
+        """(counts of the scale, counts of the node, true position in um) while the scale did not
+        change: the node is asked again until none of its edges came meanwhile, since a table that
+        still swings about an edge may swing in step with the polls.
         """
         number = self.number(name)
-        seen: tuple[int, int] | None = None
         while True:
+            before = self.twin.truth(number)
             counts = self.axes[name].status().counts
-            truth = self.twin.truth(number)
-            if seen is not None and seen == (truth.scale_counts, counts):
-                return *seen, truth.position_m * 1e6
-            seen = truth.scale_counts, counts
+            if self.twin.truth(number).scale_changes == before.scale_changes:
+                return before.scale_counts, counts, before.position_m * 1e6
 
     def move(
         self, what: str, targets_um: Mapping[str, float], speed_mm_s: float | None = None

@@ -120,6 +120,19 @@ def test_methods_17_and_18_take_the_edge_of_the_switch(method, low, high, sign, 
     assert ended == "ok" and 0 <= sign * (zero_of(machine) - edge) <= PERIOD
 
 
+def test_the_delay_of_the_poll_does_not_shift_the_edge_of_the_switch():
+    """The axis moves by more than half a period between two polls; the switch opens somewhere
+    between them.
+    """
+    late = []
+    for eighth in range(8):
+        low = -70 * PERIOD + eighth * PERIOD // 8
+        ended, machine = home(Axis(low=low), 17, homing_latch_speed=1000)
+        assert ended == "ok"
+        late.append((zero_of(machine) - low - PERIOD // 2) / PERIOD)
+    assert max(map(abs, late)) <= 0.3 and abs(sum(late) / len(late)) <= 0.15, late
+
+
 @pytest.mark.parametrize(("method", "switch", "sign"), [(1, "low", 1), (2, "high", -1)])
 def test_methods_1_and_2_take_the_first_index_after_the_switch(method, switch, sign):
     marks = [sign * (-69 + n * 20) * PERIOD + QUARTER for n in range(-3, 5)]

@@ -40,11 +40,17 @@ void plan_add(struct plan* plan, uint32_t tick, struct planner_event event) {
 void plan_advance(struct planner_progress* at, uint32_t ticks) {
     struct planner_state* s = &at->state;
     int64_t jerk = at->jerk + at->landing;
+    at->tick += ticks;
+    if (ticks == 1) {  // most pieces of a short motion: without the products
+        s->moved += (uint64_t)s->velocity;
+        s->velocity += s->acceleration;
+        s->acceleration += jerk;
+        return;
+    }
     s->moved += (uint64_t)s->velocity * ticks + (uint64_t)s->acceleration * pairs(ticks) +
                 (uint64_t)jerk * triples(ticks);
     s->velocity += (int64_t)((uint64_t)s->acceleration * ticks + (uint64_t)jerk * pairs(ticks));
     s->acceleration += jerk * ticks;
-    at->tick += ticks;
 }
 
 // Adds the events of the instant at which `at` is; `at` may be a copy of the progress of the plan.
@@ -93,6 +99,14 @@ bool plan_walk(const struct plan* plan, struct planner_progress* at, uint8_t* ne
     return true;
 }
 
+// The velocity of the next tick.
+static int64_t next_velocity(const struct plan* plan) {
+    int64_t velocity = plan->at.state.velocity;
+    for (uint8_t n = plan->next; n < plan->count && plan->event[n].tick == plan->at.tick; n++)
+        velocity += plan->event[n].velocity;
+    return velocity;
+}
+
 // Appends a tick of this velocity to a segment of one or two ticks, if the jerk fits into 32 bits.
 static bool append(struct planner_segment* piece, int64_t velocity) {
     if (piece->ticks == 1) {
@@ -113,15 +127,9 @@ bool planner_take_up_to(struct plan* plan, struct planner_segment* piece, bool* 
     if (plan->stepped) return true;
     if (longest > PLANNER_SHORT_PIECE) longest = PLANNER_SHORT_PIECE;
     while (piece->ticks < longest && !*last) {
-        struct planner_progress at = plan->at;
         struct planner_segment tick;
-        uint8_t next = plan->next;
-        bool ends;
-        plan_walk(plan, &at, &next, &tick, &ends, 1);
-        if (!append(piece, tick.velocity)) break;
-        plan->at = at;
-        plan->next = next;
-        *last = ends;
+        if (!append(piece, next_velocity(plan))) break;
+        plan_walk(plan, &plan->at, &plan->next, &tick, last, 1);
     }
     return true;
 }
