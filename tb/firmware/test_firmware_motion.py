@@ -7,7 +7,7 @@ import pytest
 
 from tb.bench import seed
 from tb.firmware.plan_model import limits, steps
-from twin.compiled.node import DEFINES, PARAMETER, PERIOD, Axis, FakeNode
+from twin.compiled.node import DEFINES, PARAMETER, PERIOD, Axis, CompiledNode
 
 TRAVEL = {
     "travel_low": -5000 * PERIOD,
@@ -21,7 +21,7 @@ ENABLE = DEFINES["AXIS_CONTROL_ENABLE_MASK"]
 
 
 def homed(axes=1, **parameters):
-    machine = FakeNode(*(Axis() for _ in range(axes)))
+    machine = CompiledNode(*(Axis() for _ in range(axes)))
     for n in range(axes):
         machine.set(axis=n, **{**TRAVEL, **parameters})
         machine.ask("enable", axis=n, on=1)

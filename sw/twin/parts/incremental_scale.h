@@ -45,7 +45,7 @@ class IncrementalScale {
         }
         return std::fmax(distance, 0);
     }
-    // the clk at which a body that moves on like this changes a level
+    // the cycle in which a body that moves on like this changes a level
     uint64_t next_change(uint64_t now, double position, double velocity, double clk_hz) const {
         const double clk =
             velocity ? way_to_change(position, velocity) / std::fabs(velocity) * clk_hz : 1e18;
