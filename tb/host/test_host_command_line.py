@@ -153,7 +153,7 @@ def test_a_node_without_sine_and_cosine_reports_it():
 
 
 def test_what_an_axis_was_built_with_is_listed_with_its_parameters():
-    node = BusNode(absent=("compare", "fine_stage"))
+    node = BusNode(absent=("compare", "fine_stage", "segments"))
     rows = dict(row.split(None, 1) for row in Call("built", node).out.splitlines()[1:])
     assert rows["HAS_COMPARE"] == rows["HAS_FINE_STAGE"] == rows["SEGMENTS"] == "not built"
     assert rows["HAS_STEPPER"] == "built" and rows["FILTERS"] == "up to 2"
