@@ -95,7 +95,8 @@ module axis #(
     wire strobes_reset_faults, strobes_set_target_to_position, strobes_start;
     wire strobes_controlled_stop, strobes_arm;
     // settings of the feedback channel
-    wire [15:0] deglitch, amplitude_low, amplitude_high;
+    wire [5:0] deglitch;
+    wire [15:0] amplitude_low, amplitude_high;
     wire [7:0] outlier_step, outlier_hold;
     wire        [19:0] disagreement_limit;
     wire        [ 5:0] encoder_fault_mask;

@@ -38,7 +38,7 @@ module feedback_channel #(
     input  wire                 sync,                // strobe: the sync pulse of the bus captures
     input  wire         [ 31:0] now,                 // cycles, time stamp
     // settings of axis_registers
-    input  wire         [ 15:0] deglitch,            // cycles that a, b and z must be stable
+    input  wire         [  5:0] deglitch,            // samples that a, b and z must be stable
     input  wire         [  7:0] outlier_step,        // ADC counts, largest step; 0: off
     input  wire         [  7:0] outlier_hold,        // samples that may be held in a row
     input  wire         [ 15:0] amplitude_low,       // ADC counts, smallest amplitude
@@ -166,7 +166,7 @@ module feedback_channel #(
     wire        [ 4:0] capture_free;
 
     incremental_encoder #(
-        .FILTER_W(16)
+        .FILTER_W(6)
     ) u_encoder (
         .clk,
         .rst,

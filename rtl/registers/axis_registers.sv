@@ -54,7 +54,7 @@ module axis_registers #(
     output logic               shift_origin_written,            // strobe: new value
     input  wire                zero_crossing_up,                // strobe: crossed going up
     input  wire                zero_crossing_down,              // strobe: crossed going down
-    output logic        [15:0] sensing_deglitch,                // time that a, cycle
+    output logic        [ 5:0] sensing_deglitch,                // samples in a row that a, sample
     output logic        [ 7:0] sensing_outlier_step,            // outlier filter
     output logic        [ 7:0] sensing_outlier_hold,            // most samples held in a row
     output logic        [15:0] amplitude_window_low,            // amplitude window
@@ -214,7 +214,7 @@ module axis_registers #(
             6'h10 && wdata[0]));
         zero_crossing_down_held <= zero_crossing_down || (zero_crossing_down_held && !(put && word
             == 6'h10 && wdata[1]));
-        if (put && word == 6'h11) sensing_deglitch <= wdata[15:0];
+        if (put && word == 6'h11) sensing_deglitch <= wdata[5:0];
         if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_step <= wdata[23:16];
         if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_hold <= wdata[31:24];
         if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_low <= wdata[15:0];
@@ -307,7 +307,7 @@ module axis_registers #(
             shift_origin <= 32'h00000000;
             zero_crossing_up_held <= '0;
             zero_crossing_down_held <= '0;
-            sensing_deglitch <= 16'h0010;
+            sensing_deglitch <= 6'h10;
             sensing_outlier_step <= 8'h00;
             sensing_outlier_hold <= HAS_SINE == 0 ? '0 : 8'h03;
             amplitude_window_low <= 16'h0000;

@@ -117,7 +117,7 @@ module register_layout #(
             9'h0C0: mask = (has_drive ? 32'h0000000F : 32'd0);
             9'h0C8, 9'h0ED, 9'h0EF, 9'h0F0, 9'h0F2, 9'h0F3, 9'h0F5, 9'h0F6, 9'h0F7: mask =
                 (has_drive ? 32'hFFFFFFFF : 32'd0);
-            9'h0D1: mask = 32'h0000FFFF | (has_sine ? 32'hFFFF0000 : 32'd0);
+            9'h0D1: mask = 32'h0000003F | (has_sine ? 32'hFFFF0000 : 32'd0);
             9'h0D2, 9'h113, 9'h114, 9'h116, 9'h117: mask = (has_monitor ? 32'hFFFFFFFF : 32'd0);
             9'h0D3: mask = (has_sine ? 32'h000FFFFF : 32'd0);
             9'h0D8: mask = 32'h0000003F;

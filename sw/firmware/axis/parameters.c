@@ -10,6 +10,7 @@
 #define PULSES_AND_DIRECTION 3u  // mode of the decoder
 #define STEP_CYCLES_MASK ACTUATOR_STEP_PULSE_HIGH_MASK
 #define COEFFICIENTS 5u  // of a filter
+#define MOST_SAMPLES AXIS_SENSING_DEGLITCH_MASK
 
 #define LIMITS(name, id, low, high, value) [id] = {low, high, value},
 
@@ -70,17 +71,21 @@ static uint64_t cycles_of(int64_t nanoseconds) {
     return (uint64_t)nanoseconds * node_read(NODE_CLK_HZ) / 1000000000u;
 }
 
-// The deglitcher counts samples: one in each cycle, or one in skip + 1 cycles.
+// The deglitcher counts samples: one in each cycle, or one in skip + 1 cycles. A time that is longer
+// than it can count takes samples further apart.
 static void apply_sensing(unsigned axis) {
     const int64_t* p = parameters[axis];
+    uint64_t cycles = cycles_of(p[BUS_PARAMETER_DEGLITCH]);
     uint32_t skip = saturate(cycles_of(p[BUS_PARAMETER_FILTER_SKIP]), 0xFFFF);
-    uint64_t samples = (cycles_of(p[BUS_PARAMETER_DEGLITCH]) + skip) / (skip + 1u);
+    uint32_t least = (uint32_t)(cycles + MOST_SAMPLES - 1u) / MOST_SAMPLES;
+    if (skip + 1u < least) skip = least - 1u;
+    uint64_t samples = (cycles + skip) / (skip + 1u);
     feedback_write(
         axis, FEEDBACK_EDGE_FILTER,
         FIELD_PUT(FEEDBACK_EDGE_FILTER_SKIP, skip) |
             FIELD_PUT(FEEDBACK_EDGE_FILTER_TOLERATED, p[BUS_PARAMETER_FILTER_TOLERATED]));
     axis_write(axis, AXIS_SENSING,
-               FIELD_PUT(AXIS_SENSING_DEGLITCH, saturate(samples, 0xFFFF)) |
+               FIELD_PUT(AXIS_SENSING_DEGLITCH, samples) |
                    FIELD_PUT(AXIS_SENSING_OUTLIER_STEP, p[BUS_PARAMETER_OUTLIER_STEP]) |
                    FIELD_PUT(AXIS_SENSING_OUTLIER_HOLD, p[BUS_PARAMETER_OUTLIER_HOLD]));
 }

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x073ebd88u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x000305f9u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -705,10 +705,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_ZERO_CROSSING_DOWN_WIDTH 1
 // rw: settings of the input filters
 #define AXIS_SENSING 0x044u
-// time that a, b and z must be stable [cycle]
-#define AXIS_SENSING_DEGLITCH_MASK 0x0000ffffu
+// samples in a row that a, b and z must have the same level; one in each edge_filter.skip + 1
+// cycles [sample]
+#define AXIS_SENSING_DEGLITCH_MASK 0x0000003fu
 #define AXIS_SENSING_DEGLITCH_SHIFT 0
-#define AXIS_SENSING_DEGLITCH_WIDTH 16
+#define AXIS_SENSING_DEGLITCH_WIDTH 6
 // outlier filter: largest step between two samples, full scale 2^(W-1); 0: off
 #define AXIS_SENSING_OUTLIER_STEP_MASK 0x00ff0000u
 #define AXIS_SENSING_OUTLIER_STEP_SHIFT 16

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x073EBD88  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x000305F9  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -835,9 +835,10 @@ FIELDS = (
     ),
     Field(
         "axis", "sensing", "deglitch",
-        0x44, 0, 16, False, "rw", "cycle",
+        0x44, 0, 6, False, "rw", "sample",
         Fraction(1, 1),
-        "time that a, b and z must be stable",
+        "samples in a row that a, b and z must have the same level; one in each "
+        "edge_filter.skip + 1 cycles",
     ),
     Field(
         "axis", "sensing", "outlier_step",
