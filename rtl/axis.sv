@@ -15,7 +15,6 @@
 `default_nettype none
 
 module axis #(
-    parameter int CLK_HZ = 4_000_000,  // Hz, clk frequency
     parameter int W = 8,  // bits of a sample
     parameter int SEGMENTS = 0,  // most segments of the scale's table; 0: no table
     parameter int HAS_SINE = 1,  // 0: no sine and cosine, positions of counts only
@@ -49,6 +48,7 @@ module axis #(
     input  wire         tick,              // strobe: servo tick
     input  wire  [23:0] tick_period,       // cycles
     input  wire         sample_tick,       // strobe: take a sample
+    input  wire         limit_tick,        // strobe: an eighth of the time of a limit switch
     input  wire  [31:0] now,               // cycles, time stamp
     // node
     input  wire         start,             // strobe: play the queued segments, with other axes
@@ -144,11 +144,10 @@ module axis #(
     wire signed [47:0] fault_position;
     wire downward, fine_saturated;
 
-    axis_inputs #(
-        .CLK_HZ(CLK_HZ)
-    ) u_inputs (
+    axis_inputs u_inputs (
         .clk,
         .rst,
+        .limit_tick,
         // pins
         .encoder_a,
         .encoder_b,

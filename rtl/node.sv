@@ -97,6 +97,8 @@ module node #(
     output logic              display_data,         // pin
     input  wire  [       1:0] edm_status            // pins, asynchronous
 );
+    localparam int LIMIT_PERIOD = CLK_HZ / 80_000;  // cycles
+
     // register bus
     wire select, write, node_select, bus_select, peripherals_select;
     wire [AXES-1:0] axis_select, feedback_select, actuator_select;
@@ -110,7 +112,7 @@ module node #(
     wire [63:0] now;
     wire [23:0] tick_period;
     wire [15:0] sample_period;
-    wire tick, sample_tick, restart_tick;
+    wire tick, sample_tick, limit_tick, restart_tick;
     // start of several axes
     wire start_axes_written, sync;
     wire [7:0] start_axes, sync_axes;
@@ -229,6 +231,16 @@ module node #(
         .restart(1'b0),
         .tick   (sample_tick)
     );
+    // a limit switch must be stable for 0.1 ms
+    tick_divider #(
+        .W($clog2(LIMIT_PERIOD + 1))
+    ) u_limit_tick (
+        .clk,
+        .rst,
+        .period ($clog2(LIMIT_PERIOD + 1)'(LIMIT_PERIOD)),
+        .restart(1'b0),
+        .tick   (limit_tick)
+    );
     common_start #(
         .AXES(AXES)
     ) u_start (
@@ -328,7 +340,6 @@ module node #(
 
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(
-            .CLK_HZ        (CLK_HZ),
             .W             (W),
             .HAS_SINE      (HAS_SINE >> n & 1),
             .HAS_MONITOR   (HAS_MONITOR >> n & 1),
@@ -362,6 +373,7 @@ module node #(
             .tick,
             .tick_period,
             .sample_tick,
+            .limit_tick,
             .now            (now[31:0]),
             // node
             .start          (start[n]),

@@ -55,7 +55,7 @@ def axis_faults(
     count: int, seed: int = 1, done: Callable[[int], None] = lambda n: None
 ) -> dict[str, int]:
     """{name: number} over so many faults of the axis: faults, failures, and those of each cause."""
-    program = build.simulation(DRIVER, ROOT / "rtl" / "axis.sv", CLK_HZ=4_000_000)
+    program = build.simulation(DRIVER, ROOT / "rtl" / "axis.sv")
     totals: dict[str, int] = {}
 
     def run(share: tuple[int, int]) -> Iterator[tuple[str, int]]:

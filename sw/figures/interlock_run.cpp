@@ -27,7 +27,8 @@ namespace {
 using moire::Random;
 
 constexpr int64_t COUNT = 1 << 14;                // position, in 2^-16 period
-constexpr int LIMIT_CYCLES = 4'000'000 / 10'000;  // limit switches must be stable for 0.1 ms
+constexpr int LIMIT_CYCLES = 4'000'000 / 10'000;  // limit switches must be stable for 0.1 ms,
+constexpr int LIMIT_TICK = LIMIT_CYCLES / 8;      // less one period of limit_tick at most
 constexpr int SENSED = 24;  // cycles from a and b to position, at most; 3 at least
 constexpr int HISTORY = 1 << 15;
 constexpr int64_t NEVER = INT64_MAX / 2;
@@ -77,6 +78,7 @@ struct Bench {
         pins->tick = now - tick_at >= period;
         if (pins->tick) tick_at = now, ticks++;
         pins->sample_tick = now % sample_period == 0;
+        pins->limit_tick = now % LIMIT_TICK == 0;
         if (!jammed && count != wanted && now - moved_at >= count_cycles)
             count += wanted > count ? 1 : -1, moved_at = now;
         const int gray = int(count + skew) & 3;
@@ -139,7 +141,7 @@ struct Bench {
     Window window(Cause cause) const {
         switch (cause) {
         case LIMIT_LOW:
-        case LIMIT_HIGH: return {now + LIMIT_CYCLES, now + LIMIT_CYCLES + 6};
+        case LIMIT_HIGH: return {now + LIMIT_CYCLES - LIMIT_TICK, now + LIMIT_CYCLES + 6};
         case DRIVE: return {now + 2, now + 6};
         default: return {now + 1, now + 1};
         }

@@ -44,6 +44,7 @@ module three_axes_bench (
             .tick,
             .tick_period     (24'd15000),
             .sample_tick,
+            .limit_tick      (1'b0),
             .start           (1'b0),
             .sync            (1'b0),
             .estop           (1'b0),

@@ -46,7 +46,7 @@ NEEDED_BY = {  # what goes with a feature
 FULL = {parameter_of(name): 1 for name in FEATURES} | {"FILTERS": 2, "SEGMENTS": 255}
 INPUTS = (
     *("select", "feedback_select", "actuator_select", "write", "word", "wdata", "tick"),
-    *("tick_period", "sample_tick", "now", "start", "sync", "estop", "watchdog_expired"),
+    *("tick_period", "sample_tick", "limit_tick", "now", "start", "sync", "estop", "watchdog_expired"),
     *("cpu_stopped", "encoder_a", "encoder_b", "encoder_z", "probe", "adc_sin", "adc_cos"),
     *("limit_low_open", "limit_high_open"),
 )
