@@ -23,6 +23,7 @@ module axis #(
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder of bursts, likewise
     parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
     parameter int HAS_COMPARE = 1,  // 1: build compare
+    parameter int HAS_ENCODER_CHECK = 1,  // 1: build the check of the encoder
     parameter int HAS_VELOCITY = 1,  // 1: build the velocity estimator
     parameter int HAS_DRIVE = 1,  // 1: build profile, servo, interlock, actuator; needs velocity
     parameter int FILTERS = 2 * HAS_DRIVE,  // biquads of the servo, 0 to 4
@@ -166,15 +167,16 @@ module axis #(
         .drive_fault
     );
     feedback_channel #(
-        .W            (W),
-        .SEGMENTS     (SEGMENTS),
-        .HAS_SINE     (HAS_SINE),
-        .HAS_MONITOR  (HAS_MONITOR),
-        .HAS_HARMONICS(HAS_HARMONICS),
-        .HAS_RECORDER (HAS_RECORDER),
-        .HAS_CAPTURE  (HAS_CAPTURE),
-        .HAS_COMPARE  (HAS_COMPARE),
-        .HAS_VELOCITY (HAS_VELOCITY)
+        .W                (W),
+        .SEGMENTS         (SEGMENTS),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_CAPTURE      (HAS_CAPTURE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_feedback (
         .clk,
         .rst,
@@ -502,6 +504,7 @@ module axis #(
         .built_recorder       (1'(HAS_RECORDER)),
         .built_capture        (1'(HAS_CAPTURE)),
         .built_compare        (1'(HAS_COMPARE)),
+        .built_encoder_check  (1'(HAS_ENCODER_CHECK)),
         .built_velocity       (1'(HAS_VELOCITY)),
         .built_drive          (1'(HAS_DRIVE)),
         .built_bridge         (1'(HAS_BRIDGE)),

@@ -7,7 +7,9 @@
 // rate     one sample per `sample_tick`, one velocity per `tick`
 // behaviour  A feature that is not built has no logic, and the registers of its settings and its
 //          state read 0. Without HAS_CAPTURE only the index captures, one at a time, with its
-//          position alone: that is what homing needs.
+//          position alone: that is what homing needs. The check of
+//          the encoder is the check of counts per revolution, the count at the last index and the
+//          time of the last edge.
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
@@ -21,6 +23,7 @@ module feedback_channel #(
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder, likewise
     parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
     parameter int HAS_COMPARE = 1,  // 1: build compare
+    parameter int HAS_ENCODER_CHECK = 1,  // 1: build the check of the encoder
     parameter int HAS_VELOCITY = 1  // 1: build the velocity estimator
 ) (
     input  wire                 clk,
@@ -166,7 +169,8 @@ module feedback_channel #(
     wire        [ 4:0] capture_free;
 
     incremental_encoder #(
-        .FILTER_W(6)
+        .FILTER_W(6),
+        .CHECK   (HAS_ENCODER_CHECK)
     ) u_encoder (
         .clk,
         .rst,
@@ -670,12 +674,13 @@ module feedback_channel #(
     end
 
     feedback_registers #(
-        .HAS_SINE     (HAS_SINE),
-        .HAS_MONITOR  (HAS_MONITOR),
-        .HAS_HARMONICS(HAS_HARMONICS),
-        .HAS_RECORDER (HAS_RECORDER),
-        .HAS_COMPARE  (HAS_COMPARE),
-        .HAS_VELOCITY (HAS_VELOCITY)
+        .HAS_SINE         (HAS_SINE),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_registers (
         .clk,
         .rst,
@@ -712,8 +717,8 @@ module feedback_channel #(
         .index_events_found                (index_found),
         .index_events_revolution_wrong     (revolution_wrong),
         .index_events_armed                (index_armed),
-        .index_count,
-        .edge_time,
+        .index_count                       (HAS_ENCODER_CHECK != 0 ? index_count : 32'sd0),
+        .edge_time                         (HAS_ENCODER_CHECK != 0 ? edge_time : 32'd0),
         // correction
         .correction_offset_sin             (sin_offset),
         .correction_offset_cos             (cos_offset),

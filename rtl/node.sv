@@ -25,6 +25,7 @@ module node #(
     parameter int HAS_SEGMENTS      = 255,        // axes with a table of SEGMENTS segments
     parameter int HAS_CAPTURE       = 255,        // axes with a queue of captures
     parameter int HAS_COMPARE       = 255,        // axes with compare
+    parameter int HAS_ENCODER_CHECK = 255,        // axes with the check of the encoder
     parameter int HAS_VELOCITY      = 255,        // axes with a velocity estimator
     parameter int HAS_DRIVE         = 255,        // axes with a drive; the others only measure
     parameter int HAS_FILTERS       = HAS_DRIVE,  // axes with FILTERS biquads, needs the drive
@@ -135,19 +136,20 @@ module node #(
         .trap
     );
     register_memory #(
-        .AXES          (AXES),
-        .FILTERS       (FILTERS == 0 ? 0 : HAS_FILTERS),
-        .HAS_BRIDGE    (HAS_BRIDGE),
-        .HAS_COMPARE   (HAS_COMPARE),
-        .HAS_DAC       (HAS_DAC),
-        .HAS_DRIVE     (HAS_DRIVE),
-        .HAS_FINE_STAGE(HAS_FINE_STAGE),
-        .HAS_HARMONICS (HAS_HARMONICS),
-        .HAS_MONITOR   (HAS_MONITOR),
-        .HAS_RECORDER  (HAS_RECORDER),
-        .HAS_SINE      (HAS_SINE),
-        .HAS_STEPPER   (HAS_STEPPER),
-        .HAS_VELOCITY  (HAS_VELOCITY)
+        .AXES             (AXES),
+        .FILTERS          (FILTERS == 0 ? 0 : HAS_FILTERS),
+        .HAS_BRIDGE       (HAS_BRIDGE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_DAC          (HAS_DAC),
+        .HAS_DRIVE        (HAS_DRIVE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_STEPPER      (HAS_STEPPER),
+        .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_register_memory (
         .clk,
         .rst,
@@ -340,21 +342,22 @@ module node #(
 
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(
-            .W             (W),
-            .HAS_SINE      (HAS_SINE >> n & 1),
-            .HAS_MONITOR   (HAS_MONITOR >> n & 1),
-            .HAS_HARMONICS (HAS_HARMONICS >> n & 1),
-            .HAS_RECORDER  (HAS_RECORDER >> n & 1),
-            .SEGMENTS      ((HAS_SEGMENTS >> n & 1) * SEGMENTS),
-            .HAS_CAPTURE   (HAS_CAPTURE >> n & 1),
-            .HAS_COMPARE   (HAS_COMPARE >> n & 1),
-            .HAS_VELOCITY  (HAS_VELOCITY >> n & 1),
-            .HAS_DRIVE     (HAS_DRIVE >> n & 1),
-            .FILTERS       ((HAS_FILTERS >> n & 1) * FILTERS),
-            .HAS_BRIDGE    (HAS_BRIDGE >> n & 1),
-            .HAS_STEPPER   (HAS_STEPPER >> n & 1),
-            .HAS_DAC       (HAS_DAC >> n & 1),
-            .HAS_FINE_STAGE(HAS_FINE_STAGE >> n & 1)
+            .W                (W),
+            .HAS_SINE         (HAS_SINE >> n & 1),
+            .HAS_MONITOR      (HAS_MONITOR >> n & 1),
+            .HAS_HARMONICS    (HAS_HARMONICS >> n & 1),
+            .HAS_RECORDER     (HAS_RECORDER >> n & 1),
+            .SEGMENTS         ((HAS_SEGMENTS >> n & 1) * SEGMENTS),
+            .HAS_CAPTURE      (HAS_CAPTURE >> n & 1),
+            .HAS_COMPARE      (HAS_COMPARE >> n & 1),
+            .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK >> n & 1),
+            .HAS_VELOCITY     (HAS_VELOCITY >> n & 1),
+            .HAS_DRIVE        (HAS_DRIVE >> n & 1),
+            .FILTERS          ((HAS_FILTERS >> n & 1) * FILTERS),
+            .HAS_BRIDGE       (HAS_BRIDGE >> n & 1),
+            .HAS_STEPPER      (HAS_STEPPER >> n & 1),
+            .HAS_DAC          (HAS_DAC >> n & 1),
+            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1)
         ) u_axis (
             .clk,
             .rst,

@@ -75,6 +75,7 @@ module axis_registers #(
     input  wire                built_recorder,                  // HAS_RECORDER
     input  wire                built_capture,                   // HAS_CAPTURE
     input  wire                built_compare,                   // HAS_COMPARE: compare pulses
+    input  wire                built_encoder_check,             // HAS_ENCODER_CHECK
     input  wire                built_velocity,                  // HAS_VELOCITY: velocity estimator
     input  wire                built_drive,                     // HAS_DRIVE
     input  wire                built_bridge,                    // HAS_BRIDGE: bridge
@@ -165,12 +166,13 @@ module axis_registers #(
         {phase_amplitude, phase_phase}) | ({32{get_quadrature_count}} & quadrature_count) |
         ({32{get_encoder_events}} & {26'd0, encoder_events_held}) | ({32{get_rejected_pulses}} &
         rejected_pulses_count) | ({32{get_rejected_samples}} & rejected_samples_count) |
-        ({32{get_built}} & {9'd0, built_segments, built_filters, built_fine_stage, built_dac,
-        built_stepper, built_bridge, built_drive, built_velocity, built_compare, built_capture,
-        built_recorder, built_harmonics, built_monitor, built_sine}) | ({32{get_following_error}} &
-        following_error) | ({32{get_command}} & {16'd0, command}) | {{16{(get_fault_position_high &&
-        fault_position_high[15]) || (get_position_high && position_high[15]) || (get_target_high &&
-        target_high[15]) || (get_command && command[15])}}, 16'd0};
+        ({32{get_built}} & {8'd0, built_segments, built_filters, built_fine_stage, built_dac,
+        built_stepper, built_bridge, built_drive, built_velocity, built_encoder_check,
+        built_compare, built_capture, built_recorder, built_harmonics, built_monitor, built_sine}) |
+        ({32{get_following_error}} & following_error) | ({32{get_command}} & {16'd0, command}) |
+        {{16{(get_fault_position_high && fault_position_high[15]) || (get_position_high &&
+        position_high[15]) || (get_target_high && target_high[15]) || (get_command &&
+        command[15])}}, 16'd0};
 
     always_ff @(posedge clk) begin
         get_state <= get && word == 6'h02;

@@ -11,12 +11,13 @@
 `default_nettype none
 
 module feedback_registers #(
-    parameter int HAS_COMPARE   = 1,  // 0: settings that need it read 0
-    parameter int HAS_HARMONICS = 1,  // 0: settings that need it read 0
-    parameter int HAS_MONITOR   = 1,  // 0: settings that need it read 0
-    parameter int HAS_RECORDER  = 1,  // 0: settings that need it read 0
-    parameter int HAS_SINE      = 1,  // 0: settings that need it read 0
-    parameter int HAS_VELOCITY  = 1   // 0: settings that need it read 0
+    parameter int HAS_COMPARE       = 1,  // 0: settings that need it read 0
+    parameter int HAS_ENCODER_CHECK = 1,  // 0: settings that need it read 0
+    parameter int HAS_HARMONICS     = 1,  // 0: settings that need it read 0
+    parameter int HAS_MONITOR       = 1,  // 0: settings that need it read 0
+    parameter int HAS_RECORDER      = 1,  // 0: settings that need it read 0
+    parameter int HAS_SINE          = 1,  // 0: settings that need it read 0
+    parameter int HAS_VELOCITY      = 1   // 0: settings that need it read 0
 ) (
     input wire clk,
     input wire rst,  // settings take their first values
@@ -200,7 +201,7 @@ module feedback_registers #(
         if (put && word == 6'h02) index_up <= wdata[5];
         if (put && word == 6'h02) index_down <= wdata[6];
         if (put && word == 6'h02) index_each <= wdata[7];
-        if (put && word == 6'h03) counts_per_revolution <= wdata[31:0];
+        if (HAS_ENCODER_CHECK != 0 && put && word == 6'h03) counts_per_revolution <= wdata[31:0];
         strobes_arm_index <= put && word == 6'h04 && wdata[0];
         strobes_load_correction <= put && word == 6'h04 && wdata[1];
         strobes_swap_harmonics <= put && word == 6'h04 && wdata[2];

@@ -18,6 +18,7 @@ module register_layout #(
     parameter int HAS_COMPARE = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_DAC = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_DRIVE = 255,  // bit n: axis n has it, else its settings are 0
+    parameter int HAS_ENCODER_CHECK = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_FINE_STAGE = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_HARMONICS = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_MONITOR = 255,  // bit n: axis n has it, else its settings are 0
@@ -51,6 +52,7 @@ module register_layout #(
     wire               has_compare = 1'(HAS_COMPARE >> axis);
     wire               has_dac = 1'(HAS_DAC >> axis);
     wire               has_drive = 1'(HAS_DRIVE >> axis);
+    wire               has_encoder_check = 1'(HAS_ENCODER_CHECK >> axis);
     wire               has_fine_stage = 1'(HAS_FINE_STAGE >> axis);
     wire               has_harmonics = 1'(HAS_HARMONICS >> axis);
     wire               has_monitor = 1'(HAS_MONITOR >> axis);
@@ -113,7 +115,7 @@ module register_layout #(
             9'h007, 9'h04C, 9'h084, 9'h099: mask = 32'h0000FFFF;
             9'h040, 9'h08A, 9'h08F, 9'h100: mask = 32'h000FFFFF;
             9'h050, 9'h102: mask = 32'h000000FF;
-            9'h091, 9'h0CF, 9'h103: mask = 32'hFFFFFFFF;
+            9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
             9'h0C0: mask = (has_drive ? 32'h0000000F : 32'd0);
             9'h0C8, 9'h0ED, 9'h0EF, 9'h0F0, 9'h0F2, 9'h0F3, 9'h0F5, 9'h0F6, 9'h0F7: mask =
                 (has_drive ? 32'hFFFFFFFF : 32'd0);
@@ -129,6 +131,7 @@ module register_layout #(
             9'h0F1: mask = (has_drive ? 32'h01FFFFFF : 32'd0);
             9'h0F4: mask = (has_drive ? 32'h0003FFFF : 32'd0);
             9'h101, 9'h12A, 9'h140: mask = 32'h00000003;
+            9'h103: mask = (has_encoder_check ? 32'hFFFFFFFF : 32'd0);
             9'h108: mask = (has_sine ? 32'hFFFFFFFF : 32'd0);
             9'h109, 9'h10A: mask = (has_sine ? 32'h0001FFFF : 32'd0);
             9'h10B: mask = (has_harmonics ? 32'h00000001 : 32'd0);

@@ -18,19 +18,20 @@
 `default_nettype none
 
 module register_memory #(
-    parameter int AXES           = 1,    // axes of the node, 1 to 8
-    parameter int FILTERS        = 255,  // bit n: axes with biquads of the servo
-    parameter int HAS_BRIDGE     = 255,  // axes with a bridge
-    parameter int HAS_COMPARE    = 255,  // axes with compare
-    parameter int HAS_DAC        = 255,  // axes with a DAC
-    parameter int HAS_DRIVE      = 255,  // axes with a drive
-    parameter int HAS_FINE_STAGE = 255,  // axes with a fine stage
-    parameter int HAS_HARMONICS  = 255,  // axes with harmonic correction
-    parameter int HAS_MONITOR    = 255,  // axes with a signal monitor
-    parameter int HAS_RECORDER   = 255,  // axes with a recorder
-    parameter int HAS_SINE       = 255,  // axes with sine and cosine
-    parameter int HAS_STEPPER    = 255,  // axes with a step generator
-    parameter int HAS_VELOCITY   = 255   // axes with a velocity estimator
+    parameter int AXES              = 1,    // axes of the node, 1 to 8
+    parameter int FILTERS           = 255,  // bit n: axes with biquads of the servo
+    parameter int HAS_BRIDGE        = 255,  // axes with a bridge
+    parameter int HAS_COMPARE       = 255,  // axes with compare
+    parameter int HAS_DAC           = 255,  // axes with a DAC
+    parameter int HAS_DRIVE         = 255,  // axes with a drive
+    parameter int HAS_ENCODER_CHECK = 255,  // axes with the check of the encoder
+    parameter int HAS_FINE_STAGE    = 255,  // axes with a fine stage
+    parameter int HAS_HARMONICS     = 255,  // axes with harmonic correction
+    parameter int HAS_MONITOR       = 255,  // axes with a signal monitor
+    parameter int HAS_RECORDER      = 255,  // axes with a recorder
+    parameter int HAS_SINE          = 255,  // axes with sine and cosine
+    parameter int HAS_STEPPER       = 255,  // axes with a step generator
+    parameter int HAS_VELOCITY      = 255   // axes with a velocity estimator
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -57,19 +58,20 @@ module register_memory #(
     assign ready = count[11];
 
     register_layout #(
-        .AXES          (AXES),
-        .FILTERS       (FILTERS),
-        .HAS_BRIDGE    (HAS_BRIDGE),
-        .HAS_COMPARE   (HAS_COMPARE),
-        .HAS_DAC       (HAS_DAC),
-        .HAS_DRIVE     (HAS_DRIVE),
-        .HAS_FINE_STAGE(HAS_FINE_STAGE),
-        .HAS_HARMONICS (HAS_HARMONICS),
-        .HAS_MONITOR   (HAS_MONITOR),
-        .HAS_RECORDER  (HAS_RECORDER),
-        .HAS_SINE      (HAS_SINE),
-        .HAS_STEPPER   (HAS_STEPPER),
-        .HAS_VELOCITY  (HAS_VELOCITY)
+        .AXES             (AXES),
+        .FILTERS          (FILTERS),
+        .HAS_BRIDGE       (HAS_BRIDGE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_DAC          (HAS_DAC),
+        .HAS_DRIVE        (HAS_DRIVE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_STEPPER      (HAS_STEPPER),
+        .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_layout (
         .address(ready ? address : {3'd0, count[10:0]}),
         .wdata,
@@ -111,19 +113,20 @@ module register_memory #(
     wire [31:0] observed_kept, observed_first;
     wire observed_low, observed_high;
     register_layout #(
-        .AXES          (AXES),
-        .FILTERS       (FILTERS),
-        .HAS_BRIDGE    (HAS_BRIDGE),
-        .HAS_COMPARE   (HAS_COMPARE),
-        .HAS_DAC       (HAS_DAC),
-        .HAS_DRIVE     (HAS_DRIVE),
-        .HAS_FINE_STAGE(HAS_FINE_STAGE),
-        .HAS_HARMONICS (HAS_HARMONICS),
-        .HAS_MONITOR   (HAS_MONITOR),
-        .HAS_RECORDER  (HAS_RECORDER),
-        .HAS_SINE      (HAS_SINE),
-        .HAS_STEPPER   (HAS_STEPPER),
-        .HAS_VELOCITY  (HAS_VELOCITY)
+        .AXES             (AXES),
+        .FILTERS          (FILTERS),
+        .HAS_BRIDGE       (HAS_BRIDGE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_DAC          (HAS_DAC),
+        .HAS_DRIVE        (HAS_DRIVE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_STEPPER      (HAS_STEPPER),
+        .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_observed (
         .address(observed),
         .wdata,

@@ -61,15 +61,15 @@ module switch_filter #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic       past = 1'b0;
     // samples in a row, up to the last one, with which level 0 had its present value
     logic [P:0] same;
-    logic level_q;
-    wire [P:0] before = level[0] == level_q ? same : '0;
+    logic       level_q;
+    wire  [P:0] earlier = level[0] == level_q ? same : '0;
     always @(posedge clk) begin
         past    <= 1'b1;
         level_q <= level[0];
-        same    <= before + {{P{1'b0}}, sample && before != '1};
+        same    <= earlier + {{P{1'b0}}, sample && earlier != '1};
         if (!past) same <= '0;
         if (!past) assume (rst);
         if (past) begin

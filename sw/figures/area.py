@@ -38,6 +38,7 @@ STEP_AXES: Parameters = {
     "HAS_SINE": 0,
     "HAS_CAPTURE": 0,
     "HAS_COMPARE": 0,
+    "HAS_ENCODER_CHECK": 0,
     "HAS_BRIDGE": 0,
     "HAS_STEPPER": ALL_AXES,
     "HAS_DAC": 0,
@@ -65,6 +66,7 @@ SPRAM = "-spram -dsp"
 OF_BOTH: dict[str, Parameters] = {
     "compare": {"HAS_COMPARE": ALL_AXES},
     "capture queue": {"HAS_CAPTURE": ALL_AXES},
+    "check of the encoder": {"HAS_ENCODER_CHECK": ALL_AXES},
     "segment table of 255": {"SEGMENTS": 255},
     "two biquads": {"FILTERS": 2},
 }

@@ -24,11 +24,12 @@ NODE = {  # bit n: axis n
     "HAS_DAC": 0,
     "HAS_CAPTURE": 1 << COUNTER,
     "HAS_COMPARE": 1 << COUNTER,
+    "HAS_ENCODER_CHECK": 1 << COUNTER,
     "HAS_FILTERS": 1 << SERVO,
 }
 BUILT = (
     {"velocity", "drive", "stepper"},
-    {"velocity", "capture", "compare"},
+    {"velocity", "capture", "compare", "encoder_check"},
     {"sine", "monitor", "harmonics", "recorder", "velocity", "drive", "bridge", "filters"},
 )
 

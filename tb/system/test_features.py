@@ -28,6 +28,7 @@ MODULES = {  # of a feature, which are gone without it
     "recorder": ("calibration_recorder",),
     "capture": ("position_capture",),
     "compare": ("position_compare",),
+    "encoder_check": (),  # a part of index_latch
     "velocity": ("velocity_estimator",),
     "drive": ("profile_player", "pid_servo", "drive_interlock", "actuator"),
     "bridge": ("bridge_pwm",),
@@ -46,7 +47,16 @@ NEEDED_BY = {  # what goes with a feature
 FULL = {parameter_of(name): 1 for name in FEATURES} | {"FILTERS": 2, "SEGMENTS": 255}
 INPUTS = (
     *("select", "feedback_select", "actuator_select", "write", "word", "wdata", "tick"),
-    *("tick_period", "sample_tick", "limit_tick", "now", "start", "sync", "estop", "watchdog_expired"),
+    *(
+        "tick_period",
+        "sample_tick",
+        "limit_tick",
+        "now",
+        "start",
+        "sync",
+        "estop",
+        "watchdog_expired",
+    ),
     *("cpu_stopped", "encoder_a", "encoder_b", "encoder_z", "probe", "adc_sin", "adc_cos"),
     *("limit_low_open", "limit_high_open"),
 )
@@ -205,6 +215,7 @@ async def what_is_not_built_reads_zero_and_its_pins_are_idle(dut):
     [
         (),
         ("monitor", "harmonics", "recorder", "capture", "compare", "fine_stage", "segments"),
+        ("encoder_check", "segments"),
         ("sine", "capture", "filters", "bridge", "dac"),
         ("velocity", "compare"),
     ],

@@ -71,8 +71,8 @@ static uint64_t cycles_of(int64_t nanoseconds) {
     return (uint64_t)nanoseconds * node_read(NODE_CLK_HZ) / 1000000000u;
 }
 
-// The deglitcher counts samples: one in each cycle, or one in skip + 1 cycles. A time that is longer
-// than it can count takes samples further apart.
+// The deglitcher counts samples: one in each cycle, or one in skip + 1 cycles. A time that is
+// longer than it can count takes samples further apart.
 static void apply_sensing(unsigned axis) {
     const int64_t* p = parameters[axis];
     uint64_t cycles = cycles_of(p[BUS_PARAMETER_DEGLITCH]);

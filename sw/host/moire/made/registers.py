@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x000305F9  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xD69CE6F4  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -993,50 +993,57 @@ FIELDS = (
         "HAS_COMPARE: compare pulses",
     ),
     Field(
-        "axis", "built", "velocity",
+        "axis", "built", "encoder_check",
         0x6C, 6, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_ENCODER_CHECK: check of counts per revolution, count at the index, time of the "
+        "last edge",
+    ),
+    Field(
+        "axis", "built", "velocity",
+        0x6C, 7, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_VELOCITY: velocity estimator",
     ),
     Field(
         "axis", "built", "drive",
-        0x6C, 7, 1, False, "r", "",
+        0x6C, 8, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_DRIVE: profile, servo, interlock; 0: the axis only measures",
     ),
     Field(
         "axis", "built", "bridge",
-        0x6C, 8, 1, False, "r", "",
+        0x6C, 9, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_BRIDGE: bridge",
     ),
     Field(
         "axis", "built", "stepper",
-        0x6C, 9, 1, False, "r", "",
+        0x6C, 10, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_STEPPER: step generator",
     ),
     Field(
         "axis", "built", "dac",
-        0x6C, 10, 1, False, "r", "",
+        0x6C, 11, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_DAC: DAC",
     ),
     Field(
         "axis", "built", "fine_stage",
-        0x6C, 11, 1, False, "r", "",
+        0x6C, 12, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_FINE_STAGE: fine stage",
     ),
     Field(
         "axis", "built", "filters",
-        0x6C, 12, 3, False, "r", "",
+        0x6C, 13, 3, False, "r", "",
         Fraction(1, 1),
         "FILTERS: biquads of the servo; 0: none",
     ),
     Field(
         "axis", "built", "segments",
-        0x6C, 15, 8, False, "r", "",
+        0x6C, 16, 8, False, "r", "",
         Fraction(1, 1),
         "SEGMENTS: most segments of the table; 0: none",
     ),
