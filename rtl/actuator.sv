@@ -23,7 +23,6 @@ module actuator #(
     input  wire               write,            // level: the access writes
     input  wire        [ 5:0] word,             // 32-bit word of the block
     input  wire        [31:0] wdata,            // value to write
-    input  wire        [31:0] wdata_low,        // low word of a value of 64 bits
     output logic       [31:0] rdata,            // live bits read, in the next cycle; else 0
     // time
     input  wire               tick,             // strobe: servo tick
@@ -31,14 +30,18 @@ module actuator #(
     // permission
     input  wire               enable,           // level: the interlock allows the drive
     input  wire               fine,             // level: the fine stage holds the position
-    input  wire               rebase,           // strobe: the target jumps, do not follow it
     input  wire               block_up,         // level: the interlock blocks motion up
     input  wire               block_down,       // level: the interlock blocks motion down
     // motion
     input  wire               valid,            // strobe: command is new
     input  wire signed [15:0] command,          // full scale 2^15
     input  wire signed [47:0] target,           // 2^-16 period
-    input  wire signed [31:0] target_velocity,  // 2^-16 period/tick
+    input  wire               target_up,        // level: the target moves up
+    input  wire               target_down,      // level: the target moves down
+    input  wire               steps_valid,      // strobe: steps_target is new
+    input  wire               steps_restart,    // level: with steps_valid, restart there
+    input  wire signed [47:0] steps_target,     // 2^-16 motor step, with steps_valid
+    input  wire               compared,         // strobe: target and position of this tick are known
     input  wire               moving,           // level: a profile is being played
     input  wire signed [47:0] position,         // 2^-16 period
     // pins
@@ -71,8 +74,6 @@ module actuator #(
     wire        [ 1:0] mode;
     wire [13:0] high_cycles, low_cycles, setup_cycles, hold_cycles;
     wire step_low, direction_low;
-    wire        [ 3:0] trim_shift;
-    wire signed [47:0] step_ratio;
     wire signed [31:0] steps;
     // DAC
     wire        [ 7:0] half_period;
@@ -122,34 +123,36 @@ module actuator #(
 
     if (HAS_STEPPER != 0) begin : g_stepper
         wire go, restart, driven, allowed;
-        wire signed [47:0] step_target;
+        wire line_up, line_down;
+        wire signed [47:0] line_target;
 
         step_permission u_permission (
             .enable,
-            .by_steps(stepper_selected),
+            .by_steps   (stepper_selected),
             .block_up,
             .block_down,
-            .target_velocity,
+            .target_up  (line_up),
+            .target_down(line_down),
             .driven,
             .allowed
         );
-        step_follower u_follower (
+        step_line u_line (
             .clk,
             .rst,
-            // settings
-            .ratio   (step_ratio),
-            .shift   (trim_shift),
-            // permission
-            .enable  (driven),
-            .rebase,
-            // motion
+            .enable     (driven),
             .tick,
-            .target,
-            .trim    (command),
-            // steps
+            // the target of this tick
+            .valid      (steps_valid),
+            .restart_in (steps_restart),
+            .target_in  (steps_target),
+            .up_in      (target_up),
+            .down_in    (target_down),
+            // the line
             .go,
             .restart,
-            .position(step_target)
+            .target     (line_target),
+            .target_up  (line_up),
+            .target_down(line_down)
         );
         step_generator #(
             .PERIOD_W(18)
@@ -169,7 +172,7 @@ module actuator #(
             .enable (allowed),
             .load   (restart),
             .tick   (go),
-            .target (step_target),
+            .target (line_target),
             // pins and state
             .step,
             .direction,
@@ -180,9 +183,12 @@ module actuator #(
         wire unused = &{1'b0, tick_period[23:18]};
     end else begin : g_no_stepper
         assign {step, direction, step_overrun, steps} = '0;
-        wire unused_motion = &{1'b0, tick_period, rebase, block_up, block_down, target_velocity};
+        wire unused_motion = &{1'b0, tick, tick_period, block_up, block_down};
+        wire unused_target = &{
+            1'b0, target_up, target_down, steps_valid, steps_restart, steps_target
+        };
         wire unused_times = &{1'b0, high_cycles, low_cycles, setup_cycles, hold_cycles};
-        wire unused_settings = &{1'b0, mode, step_low, step_ratio, trim_shift, stepper_selected};
+        wire unused_settings = &{1'b0, mode, step_low, stepper_selected};
     end
 
     if (HAS_FINE_STAGE != 0) begin : g_fine
@@ -198,7 +204,7 @@ module actuator #(
             .limit        (fine_limit),
             .gains_changed(fine_kp_written),
             // motion
-            .tick,
+            .tick         (compared),
             .target,
             .moving,
             .position,
@@ -210,7 +216,7 @@ module actuator #(
     end else begin : g_no_fine
         assign {fine_valid, fine_command, fine_saturated} = '0;
         wire unused_settings = &{1'b0, fine, fine_kp, fine_ki, fine_limit, fine_kp_written};
-        wire unused_motion = &{1'b0, tick, target, moving, position};
+        wire unused_motion = &{1'b0, compared, target, moving, position};
     end
 
     if (HAS_DAC != 0) begin : g_dac
@@ -253,7 +259,6 @@ module actuator #(
         .write,
         .word,
         .wdata,
-        .wdata_low,
         .rdata,
         // which drive
         .drive                    (kind),
@@ -267,8 +272,6 @@ module actuator #(
         .step_output_mode         (mode),
         .step_output_step_low     (step_low),
         .step_output_direction_low(direction_low),
-        .step_output_trim         (trim_shift),
-        .step_ratio,
         .steps,
         // DAC
         .dac_half_period          (half_period),

@@ -2,8 +2,8 @@
 """Model of rtl/drive/step_permission.sv."""
 
 
-def permission(enable, by_steps, block_up, block_down, target_velocity):
+def permission(enable, by_steps, block_up, block_down, target_up, target_down):
     """Return (driven, allowed): a stepper drive is on; its target may be followed."""
     driven = enable and by_steps
-    blocked = target_velocity > 0 and block_up or target_velocity < 0 and block_down
+    blocked = target_up and block_up or target_down and block_down
     return int(driven), int(driven and not blocked)
