@@ -3,7 +3,7 @@
 // stepper driver or a DAC, with a fine stage that uses the DAC.
 //
 // latency  see bridge_pwm, step_generator, spi_dac and fine_stage
-// rate     one command per tick, a tick at least 61 cycles after the one before
+// rate     one command per tick, a tick at least 53 cycles after the one before
 // behaviour  The pins of a drive that is not built are idle.
 // source   S0: DC motor by PWM, piezo on top; S2: stepper; S3: current amplifier behind a DAC of 16
 //          bits
@@ -41,8 +41,7 @@ module actuator #(
     input  wire               steps_valid,      // strobe: steps_target is new
     input  wire               steps_restart,    // level: with steps_valid, restart there
     input  wire signed [47:0] steps_target,     // 2^-16 motor step, with steps_valid
-    input  wire               compared,         // strobe: target and position of this tick are known
-    input  wire               moving,           // level: a profile is being played
+    input  wire               compared,         // strobe: target of this tick is known
     input  wire signed [47:0] position,         // 2^-16 period
     // pins
     output logic              bridge_a,         // pin, alone high for a positive command
@@ -206,7 +205,6 @@ module actuator #(
             // motion
             .tick         (compared),
             .target,
-            .moving,
             .position,
             // command
             .valid        (fine_valid),
@@ -216,7 +214,7 @@ module actuator #(
     end else begin : g_no_fine
         assign {fine_valid, fine_command, fine_saturated} = '0;
         wire unused_settings = &{1'b0, fine, fine_kp, fine_ki, fine_limit, fine_kp_written};
-        wire unused_motion = &{1'b0, compared, target, moving, position};
+        wire unused_motion = &{1'b0, compared, target, position};
     end
 
     if (HAS_DAC != 0) begin : g_dac

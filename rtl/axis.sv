@@ -360,7 +360,6 @@ module axis #(
             .steps_restart,
             .steps_target,
             .compared,
-            .moving,
             .position,
             // pins
             .bridge_a,
