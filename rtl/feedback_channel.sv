@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// feedback_channel -- the measuring path of an axis: from the pins of a scale to position and
-// velocity.
+// feedback_channel -- the measuring path of an axis: from the pins of a scale to its position.
 //
 // latency  22 cycles from an ADC word to position, 5 cycles from the pins a and b to position in
 //          the mode of counts; 1 cycle more each with a segment table
-// rate     one sample per `sample_tick`, one velocity per `tick`
+// rate     one sample per `sample_tick`
 // behaviour  A feature that is not built has no logic, and the registers of its settings and its
 //          state read 0. Without HAS_CAPTURE only the index captures, one at a time, with its
 //          position alone: that is what homing needs. The check of
@@ -23,8 +22,7 @@ module feedback_channel #(
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder, likewise
     parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
     parameter int HAS_COMPARE = 1,  // 1: build compare
-    parameter int HAS_ENCODER_CHECK = 1,  // 1: build the check of the encoder
-    parameter int HAS_VELOCITY = 1  // 1: build the velocity estimator
+    parameter int HAS_ENCODER_CHECK = 1  // 1: build the check of the encoder
 ) (
     input  wire                 clk,
     input  wire                 rst,
@@ -80,7 +78,9 @@ module feedback_channel #(
     output logic signed [ 47:0] position,            // 2^-16 period, less the segment error
     output logic                moved,               // strobe: position will jump by moved_by
     output logic signed [ 47:0] moved_by,            // 2^-16 period, in the next cycle
-    output logic signed [ 31:0] velocity             // 2^-16 period/tick, of the scale itself
+    output logic                moves,               // level: position will jump, with the table
+    output logic                step_made,           // strobe: position moves in the next cycle
+    output logic                step_down            // level: with step_made, it goes down
 );
     localparam int CAPTURE_DELAY = SEGMENTS == 0 ? 2 : 3;  // cycles from an index to its position
 
@@ -121,8 +121,7 @@ module feedback_channel #(
     wire phases, record, recorder_read;
     // settings of the position
     wire use_counts, own_steps, align_written;
-    wire signed [ 2:0] align;
-    wire        [15:0] quantum;
+    wire signed [2:0] align;
     // settings of the segment table
     wire segment_enable, segment_linear, segment_origin_written, segment_point_written;
     wire segment_read;
@@ -155,7 +154,6 @@ module feedback_channel #(
     wire signed [16:0] counted_step, step;
     wire [15:0] counted_phase, step_phase;
     wire signed [47:0] scale_position;
-    wire signed [39:0] velocity_fine;
     // segment table
     wire segment_in_force, segment_outside, segment_known, shifted;
     wire signed [31:0] shifted_periods;
@@ -501,28 +499,20 @@ module feedback_channel #(
         .done    (scale_valid),
         .position(scale_position)
     );
-    if (HAS_VELOCITY != 0) begin : g_velocity
-        velocity_estimator u_velocity (
-            .clk,
-            .rst,
-            .quantum,
-            .tick,
-            // position of the scale
-            .position(scale_position),
-            .shift,
-            .shift_periods,
-            // velocity
-            .velocity,
-            .fine    (velocity_fine)
-        );
-    end else begin : g_no_velocity
-        assign {velocity, velocity_fine} = '0;
-        wire unused = &{1'b0, quantum};
-    end
-
+    step_events #(
+        .DELAY(SEGMENTS == 0 ? 0 : 1)
+    ) u_steps (
+        .clk,
+        .rst,
+        .valid   (stepped),
+        .step,
+        .stepped (step_made),
+        .downward(step_down)
+    );
     if (SEGMENTS != 0) begin : g_segments
         localparam int INDEX = $clog2(SEGMENTS + 1);
 
+        assign moves = segment_enable != segment_in_force;
         segment_correction #(
             .INDEX(INDEX)
         ) u_segments (
@@ -569,6 +559,7 @@ module feedback_channel #(
     end else begin : g_no_segments
         assign {position_valid, position} = {scale_valid, scale_position};
         assign {moved, moved_by} = {shift, shift_periods, 16'd0};
+        assign moves = 1'b0;
         assign {shifted, shifted_periods} = {shift, shift_periods};
         assign {segment_in_force, segment_outside, segment_known} = '0;
         assign {segment_error, segment_stored} = '0;
@@ -679,8 +670,7 @@ module feedback_channel #(
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_RECORDER     (HAS_RECORDER),
         .HAS_COMPARE      (HAS_COMPARE),
-        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
-        .HAS_VELOCITY     (HAS_VELOCITY)
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK)
     ) u_registers (
         .clk,
         .rst,
@@ -767,9 +757,7 @@ module feedback_channel #(
         .compare_state_armed               (armed),
         .compare_state_late                (late),
         .compare_passed                    (passed),
-        // velocity and source of the position
-        .velocity_quantum                  (quantum),
-        .velocity_fine,
+        // source of the position
         .position_source_counts            (use_counts),
         .position_source_steps             (own_steps),
         .align,

@@ -44,12 +44,8 @@ module step_generator #(
     input  wire                      line_idle,      // level: the line has ended
     input  wire                      rate_valid,     // strobe: the rate of the next line is new
     input  wire signed  [  RATE_F:0] rate,           // 2^-RATE_F step per cycle, with rate_valid
-    input  wire                      rate_up,        // level: that line leads up
-    input  wire                      rate_down,      // level: that line leads down
     input  wire                      rate_restart,   // level: that line begins at a whole step
     input  wire                      rate_steep,     // level: that line is too steep
-    output logic                     line_up,        // level: the line leads up
-    output logic                     line_down,      // level: the line leads down
     output logic                     stopped,        // level: no line is followed until a restart
     output logic                     step,           // level: pin
     output logic                     direction,      // level: pin, high going up
@@ -69,7 +65,7 @@ module step_generator #(
 
     // the next line, and the one that is drawn
     logic signed [RATE_F:0] next_rate, slope;  // 2^-RATE_F step per cycle
-    logic next_up, next_down, next_restart, next_steep;
+    logic next_restart, next_steep;
 
     // the pins; ahead is the line's distance from the next step that the pins can make: a step up
     // is due from 0 on, a step down below 0
@@ -126,11 +122,10 @@ module step_generator #(
     end
 
     always_ff @(posedge clk) begin
-        if (line_start) {slope, line_up, line_down} <= {next_rate, next_up, next_down};
-        if (line_start || rst) {next_rate, next_up, next_down, next_restart, next_steep} <= '0;
+        if (line_start) slope <= next_rate;
+        if (line_start || rst) {next_rate, next_restart, next_steep} <= '0;
         if (rate_valid) begin
             next_rate <= rate;
-            {next_up, next_down} <= {rate_up, rate_down};
             {next_restart, next_steep} <= {rate_restart, rate_steep};
         end
         if (!enable || (line_start && next_restart)) stopped <= !enable;
@@ -138,7 +133,7 @@ module step_generator #(
         acted    <= rise || turns;
         reverses <= !acted && behind == upward && whole != {AHEAD_W{behind}};
         if (!restart && ((line_start && next_steep) || behind != ahead[W-2])) overrun <= 1'b1;
-        if (line_idle || restart) {slope, line_up, line_down} <= '0;
+        if (line_idle || restart) slope <= '0;
         if (restart) begin
             ahead    <= '0;
             acted    <= upward;

@@ -42,8 +42,6 @@ module step_lines #(
     output logic                       line_idle,     // level: the lines have ended
     output logic        [    AXES-1:0] rate_valid,    // strobes: the rate of the next line is new
     output logic signed [    RATE_F:0] rate,          // 2^-RATE_F step per cycle, with rate_valid
-    output logic                       rate_up,       // level: that line leads up
-    output logic                       rate_down,     // level: that line leads down
     output logic                       rate_restart,  // level: that line begins at a whole step
     output logic                       rate_steep     // level: that line is too steep
 );
@@ -130,8 +128,6 @@ module step_lines #(
                 else seen <= n == A'(AXES - 1) ? '0 : n + 1'b1;
             end
             LOAD: begin
-                rate_up    <= distance > 0;
-                rate_down  <= distance < 0;
                 rate_steep <= too_far && !rate_restart;
                 remainder  <= dividend[17+:P];
                 digits     <= {dividend[16:0], (RATE_F - 16)'(rests[n])};

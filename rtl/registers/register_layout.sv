@@ -123,13 +123,13 @@ module register_layout #(
             9'h0D2, 9'h113, 9'h114, 9'h116, 9'h117: mask = (has_monitor ? 32'hFFFFFFFF : 32'd0);
             9'h0D3: mask = (has_sine ? 32'h000FFFFF : 32'd0);
             9'h0D8: mask = 32'h0000003F;
+            9'h0DC, 9'h0E5: mask = (has_drive ? 32'h00007FFF : 32'd0);
             9'h0E0, 9'h0E1, 9'h0E2, 9'h0E3, 9'h0E4: mask = (has_drive ? 32'h00FFFFFF : 32'd0);
-            9'h0E5: mask = (has_drive ? 32'h3FFFFFFF : 32'd0);
             9'h0E6, 9'h0E9: mask = (has_drive ? 32'h0000FFFF : 32'd0);
-            9'h0EA: mask = (filters ? 32'h000001FF : 32'd0);
+            9'h0EA: mask = (filters ? 32'h0000001F : 32'd0);
             9'h0EB: mask = (filters ? 32'hFFFFFFFF : 32'd0);
             9'h0F1: mask = (has_drive ? 32'h01FFFFFF : 32'd0);
-            9'h0F4: mask = (has_drive ? 32'h0003FFFF : 32'd0);
+            9'h0F4: mask = (has_drive ? 32'h0001FFFF : 32'd0);
             9'h101, 9'h12A, 9'h140: mask = 32'h00000003;
             9'h103: mask = (has_encoder_check ? 32'hFFFFFFFF : 32'd0);
             9'h108: mask = (has_sine ? 32'hFFFFFFFF : 32'd0);
@@ -147,8 +147,8 @@ module register_layout #(
             9'h12B: mask = 32'h00000007;
             9'h141: mask = (has_bridge ? 32'h0000FFFF : 32'd0);
             9'h142, 9'h143: mask = (has_stepper ? 32'h0FFFFFFF : 32'd0);
-            9'h144: mask = (has_stepper ? 32'h000000FF : 32'd0);
-            9'h147: mask = (has_stepper ? 32'h0000FFFF : 32'd0);
+            9'h144: mask = (has_stepper ? 32'h0000000F : 32'd0);
+            9'h145, 9'h147: mask = (has_stepper ? 32'h0000FFFF : 32'd0);
             9'h149: mask = (has_dac ? 32'h00FFFFFF : 32'd0);
             9'h14A: mask = (has_dac ? 32'h0000FFFF : 32'd0);
             9'h14C, 9'h14D: mask = (has_fine_stage ? 32'h00FFFFFF : 32'd0);
@@ -182,6 +182,7 @@ module register_layout #(
             9'h114, 9'h115: first = (has_monitor ? 32'h0000FFFF : 32'd0);
             9'h123, 9'h124: first = (has_compare ? 32'h00000001 : 32'd0);
             9'h142, 9'h143: first = (has_stepper ? 32'h00004001 : 32'd0);
+            9'h145: first = (has_stepper ? 32'h00000001 : 32'd0);
             9'h149: first = (has_dac ? 32'h00FFFF01 : 32'd0);
             default: first = '0;
         endcase

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/drive/step_generator.sv in integers: clk(...) advances one cycle and returns (step,
-direction, steps, overrun, stopped, line_up, line_down) after it.
+direction, steps, overrun, stopped) after it.
 """
 
 STEP_DIRECTION, QUADRATURE = 0, 1
@@ -35,17 +35,16 @@ class StepGenerator:
         self.wiring = (0, 0, 0)  # mode, step_low and direction_low in force
         self.pins = (0, 0)
         self.stopped = True
-        self.next = (0, 0, 0, 0, 0)  # rate, up, down, restart, steep
+        self.next = (0, 0, 0)  # rate, restart, steep
         self.restart()
         return self.shown()
 
     def restart(self):
-        self.line = (0, 0, 0)  # rate, up, down
+        self.rate = 0
         self.ahead, self.reverses, self.acted = 0, False, self.upward
 
     def shown(self):
-        steps = signed(self.steps, 32)
-        return *self.pins, steps, int(self.overrun), int(self.stopped), *self.line[1:]
+        return *self.pins, signed(self.steps, 32), int(self.overrun), int(self.stopped)
 
     def levels(self):
         """The levels of the pins in this state."""
@@ -73,16 +72,14 @@ class StepGenerator:
         line_idle=0,
         rate_valid=0,
         rate=0,
-        rate_up=0,
-        rate_down=0,
         rate_restart=0,
         rate_steep=0,
     ):
-        *_, next_restart, next_steep = self.next
+        _, next_restart, next_steep = self.next
         if rst:
             self.reset()
             if rate_valid:
-                self.next = (rate, rate_up, rate_down, rate_restart, rate_steep)
+                self.next = (rate, rate_restart, rate_steep)
             return self.shown()
         begins = line_start and next_restart
         restarts = not enable or self.stopped or begins
@@ -108,14 +105,14 @@ class StepGenerator:
         behind = self.ahead < -one if self.upward else self.ahead >= one
         self.reverses = not self.acted and behind
         back = self.acted * (-one if self.upward else one)
-        self.ahead = signed(self.ahead + back + self.line[0], self.bits)
+        self.ahead = signed(self.ahead + back + self.rate, self.bits)
         self.acted = rise or turns
         if line_start:
-            self.line, self.next = self.next[:3], (0, 0, 0, 0, 0)
+            self.rate, self.next = self.next[0], (0, 0, 0)
         if line_idle:
-            self.line = (0, 0, 0)
+            self.rate = 0
         if rate_valid:
-            self.next = (rate, rate_up, rate_down, rate_restart, rate_steep)
+            self.next = (rate, rate_restart, rate_steep)
         if not enable or begins:
             self.stopped = not enable
         upward = self.upward

@@ -36,7 +36,7 @@ class StepLines:
 
     def clk(self, rst=0, period=0, tick=0, valid=0, axis=0, target=0, restart_in=0, stopped=0):
         """(line_start, line_idle, rate_valid, what is given with it); the last is None or (rate,
-        up, down, restart, steep).
+        restart, steep).
         """
         ended, served = self.left == 0, self.axes[self.n]
         start = bool((tick or self.waiting) and ended and period)
@@ -89,10 +89,9 @@ class StepLines:
     def load(self, axis, period):
         found = rate_of(self.distance, axis.rest, period, self.rate_f)
         steep = found is TOO_FAR and not self.restarts
-        up, down = int(self.distance > 0), int(self.distance < 0)
         self.rest = None
         if steep or self.restarts:
-            self.given, self.state = (0, up, down, int(self.restarts), int(steep)), "give"
+            self.given, self.state = (0, int(self.restarts), int(steep)), "give"
         else:
             rate, self.rest = found
-            self.given, self.state, self.bits = (rate, up, down, 0, 0), "divide", self.rate_f + 1
+            self.given, self.state, self.bits = (rate, 0, 0), "divide", self.rate_f + 1

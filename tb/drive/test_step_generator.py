@@ -31,9 +31,7 @@ IDLE = dict(
     enable=0,
     line_idle=1,
 )
-ONCE = dict.fromkeys(
-    ("line_start", "rate_valid", "rate", "rate_up", "rate_down", "rate_restart", "rate_steep"), 0
-)
+ONCE = dict.fromkeys(("line_start", "rate_valid", "rate", "rate_restart", "rate_steep"), 0)
 WAVEFORM = ROOT / "build" / "step_generator.csv"
 RECORDING = ROOT.parent / "shared" / "captures" / "smoothieware_steps.csv"
 SLOWER = 50  # samples of the recording per cycle
@@ -70,15 +68,14 @@ class Generator:
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
         dut = self.dut
-        ports = (dut.overrun, dut.stopped, dut.line_up, dut.line_down)
+        ports = (dut.overrun, dut.stopped)
         got = (
             *(int(dut.step.value), int(dut.direction.value), dut.steps.value.to_signed()),
             *(int(port.value) for port in ports),
         )
         want = self.model.clk(**levels)
         assert got == want, (
-            f"{levels}: step, direction, steps, overrun, stopped, line_up, line_down are {got}, "
-            f"the model has {want}"
+            f"{levels}: step, direction, steps, overrun, stopped are {got}, the model has {want}"
         )
         self.seen.append(got[:2])
         return got[:4]
@@ -102,12 +99,11 @@ class Generator:
         target = int(target * ONE)
         distance = wrapped(target - self.end)
         found = rate_of(distance, self.rest, self.period, RATE_F)
-        up, down = int(distance > 0), int(distance < 0)
         if found is TOO_FAR:
-            await self.clk(rate_valid=1, rate_up=up, rate_down=down, rate_steep=1)
+            await self.clk(rate_valid=1, rate_steep=1)
         else:
             rate, self.rest = found
-            await self.clk(rate_valid=1, rate=rate, rate_up=up, rate_down=down)
+            await self.clk(rate_valid=1, rate=rate)
         self.end = target
         await self.clk(line_start=1, line_idle=0)
         await self.wait(self.period - 1)
@@ -332,7 +328,7 @@ async def overrun_rises_when_target_runs_away_and_only_restart_reset_or_enable_l
 async def a_line_ends_with_line_idle_and_another_may_follow_at_once(dut):
     generator = await Generator(dut).reset()
     await generator.line(1)
-    rate = ONCE | dict(rate_valid=1, rate=1 << RATE_F - 2, rate_up=1)
+    rate = ONCE | dict(rate_valid=1, rate=1 << RATE_F - 2)
     await generator.clk(**rate)
     await generator.clk(line_start=1, line_idle=0)
     await generator.clk(**rate)
@@ -369,8 +365,6 @@ async def any_lines_match_the_model(dut):
             inputs.update(
                 rate_valid=1,
                 rate=rate >> random.choice((0, 0, 1, 4)),
-                rate_up=random.getrandbits(1),
-                rate_down=random.getrandbits(1),
                 rate_restart=int(random.randrange(4) == 0),
                 rate_steep=int(random.randrange(40) == 0),
             )

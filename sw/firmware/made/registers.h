@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xd69ce6f4u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xc18c3066u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -652,16 +652,19 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_FAULTS_STEP_OVERRUN_MASK 0x00000200u
 #define AXIS_FAULTS_STEP_OVERRUN_SHIFT 9
 #define AXIS_FAULTS_STEP_OVERRUN_WIDTH 1
+#define AXIS_FAULTS_SERVO_OVERRUN_MASK 0x00000400u
+#define AXIS_FAULTS_SERVO_OVERRUN_SHIFT 10
+#define AXIS_FAULTS_SERVO_OVERRUN_WIDTH 1
 // r: causes present now, same bits as faults
 #define AXIS_CAUSES_NOW 0x010u
-#define AXIS_CAUSES_NOW_MASK 0x000003ffu
+#define AXIS_CAUSES_NOW_MASK 0x000007ffu
 #define AXIS_CAUSES_NOW_SHIFT 0
-#define AXIS_CAUSES_NOW_WIDTH 10
+#define AXIS_CAUSES_NOW_WIDTH 11
 // r: cause that came first, same bits as faults; one bit
 #define AXIS_FIRST_FAULT 0x014u
-#define AXIS_FIRST_FAULT_MASK 0x000003ffu
+#define AXIS_FIRST_FAULT_MASK 0x000007ffu
 #define AXIS_FIRST_FAULT_SHIFT 0
-#define AXIS_FIRST_FAULT_WIDTH 10
+#define AXIS_FIRST_FAULT_WIDTH 11
 // r: position when the first fault was latched [1/65536 period]
 #define AXIS_FAULT_POSITION 0x018u
 #define AXIS_FAULT_POSITION_LOW 0x018u
@@ -856,6 +859,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_BUILT_SEGMENTS_MASK 0x00ff0000u
 #define AXIS_BUILT_SEGMENTS_SHIFT 16
 #define AXIS_BUILT_SEGMENTS_WIDTH 8
+// rw: largest |integral term|; full scale 2^15
+#define AXIS_INTEGRAL_LIMIT 0x070u
+#define AXIS_INTEGRAL_LIMIT_MASK 0x00007fffu
+#define AXIS_INTEGRAL_LIMIT_SHIFT 0
+#define AXIS_INTEGRAL_LIMIT_WIDTH 15
 // rw: proportional gain on the error [1/65536 command/(period/65536)]
 #define AXIS_KP 0x080u
 #define AXIS_KP_MASK 0x00ffffffu
@@ -881,16 +889,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_KA_MASK 0x00ffffffu
 #define AXIS_KA_SHIFT 0
 #define AXIS_KA_WIDTH 24
-// rw: limits of the servo; full scale 2^15
-#define AXIS_SERVO_LIMITS 0x094u
-// largest |command|
-#define AXIS_SERVO_LIMITS_OUTPUT_MASK 0x00007fffu
-#define AXIS_SERVO_LIMITS_OUTPUT_SHIFT 0
-#define AXIS_SERVO_LIMITS_OUTPUT_WIDTH 15
-// largest |integral term|
-#define AXIS_SERVO_LIMITS_INTEGRAL_MASK 0x3fff8000u
-#define AXIS_SERVO_LIMITS_INTEGRAL_SHIFT 15
-#define AXIS_SERVO_LIMITS_INTEGRAL_WIDTH 15
+// rw: largest |command|; full scale 2^15
+#define AXIS_OUTPUT_LIMIT 0x094u
+#define AXIS_OUTPUT_LIMIT_MASK 0x00007fffu
+#define AXIS_OUTPUT_LIMIT_SHIFT 0
+#define AXIS_OUTPUT_LIMIT_WIDTH 15
 // rw: dead band: the integrator holds while |error| is not above this and no profile is played
 // [1/65536 period]
 #define AXIS_DEAD_BAND 0x098u
@@ -912,21 +915,17 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_OPEN_COMMAND_MASK 0x0000ffffu
 #define AXIS_OPEN_COMMAND_SHIFT 0
 #define AXIS_OPEN_COMMAND_WIDTH 16
-// rw: filters of the servo; a section takes new coefficients only while it is not in use
-#define AXIS_FILTERS 0x0a8u
-// bit n: section n filters; else it passes its input
-#define AXIS_FILTERS_IN_USE_MASK 0x0000000fu
-#define AXIS_FILTERS_IN_USE_SHIFT 0
-#define AXIS_FILTERS_IN_USE_WIDTH 4
-// section * 8 + coefficient; 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
-#define AXIS_FILTERS_ADDRESS_MASK 0x000001f0u
-#define AXIS_FILTERS_ADDRESS_SHIFT 4
-#define AXIS_FILTERS_ADDRESS_WIDTH 5
-// rw: coefficient; writing stores it at filters.address
-#define AXIS_FILTER_COEFFICIENT 0x0acu
-#define AXIS_FILTER_COEFFICIENT_MASK 0xffffffffu
-#define AXIS_FILTER_COEFFICIENT_SHIFT 0
-#define AXIS_FILTER_COEFFICIENT_WIDTH 32
+// rw: number of a value of a filter: filter * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2, 5: whether
+// it filters, 0: no
+#define AXIS_FILTER_ADDRESS 0x0a8u
+#define AXIS_FILTER_ADDRESS_MASK 0x0000001fu
+#define AXIS_FILTER_ADDRESS_SHIFT 0
+#define AXIS_FILTER_ADDRESS_WIDTH 5
+// rw: value of a filter; writing stores it at filter_address
+#define AXIS_FILTER_VALUE 0x0acu
+#define AXIS_FILTER_VALUE_MASK 0xffffffffu
+#define AXIS_FILTER_VALUE_SHIFT 0
+#define AXIS_FILTER_VALUE_WIDTH 32
 // rw: velocity at the start of the segment [2^-40 period/tick]
 #define AXIS_SEGMENT_VELOCITY 0x0b0u
 #define AXIS_SEGMENT_VELOCITY_LOW 0x0b0u
@@ -961,16 +960,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_STOP_JERK_MASK 0xffffffffu
 #define AXIS_STOP_JERK_SHIFT 0
 #define AXIS_STOP_JERK_WIDTH 32
-// rw: feed override: the speed at which profiles are played
+// rw: feed override: fraction of full speed, 65536 at most, at which profiles are played; 0: pause
 #define AXIS_FEED_OVERRIDE 0x0d0u
-// fraction of full speed, 65536 at most
-#define AXIS_FEED_OVERRIDE_FRACTION_MASK 0x0001ffffu
-#define AXIS_FEED_OVERRIDE_FRACTION_SHIFT 0
-#define AXIS_FEED_OVERRIDE_FRACTION_WIDTH 17
-// 1: pause inside the profile
-#define AXIS_FEED_OVERRIDE_PAUSE_MASK 0x00020000u
-#define AXIS_FEED_OVERRIDE_PAUSE_SHIFT 17
-#define AXIS_FEED_OVERRIDE_PAUSE_WIDTH 1
+#define AXIS_FEED_OVERRIDE_MASK 0x0001ffffu
+#define AXIS_FEED_OVERRIDE_SHIFT 0
+#define AXIS_FEED_OVERRIDE_WIDTH 17
 // rw: largest change of the override; 0: not limited [2^-32 1/tick]
 #define AXIS_FEED_OVERRIDE_SLOPE 0x0d4u
 #define AXIS_FEED_OVERRIDE_SLOPE_MASK 0xffffffffu
@@ -1294,11 +1288,6 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_VELOCITY_QUANTUM_MASK 0x0000ffffu
 #define FEEDBACK_VELOCITY_QUANTUM_SHIFT 0
 #define FEEDBACK_VELOCITY_QUANTUM_WIDTH 16
-// r: velocity with all its bits [2^-24 period/tick]
-#define FEEDBACK_VELOCITY_FINE 0x0a0u
-#define FEEDBACK_VELOCITY_FINE_LOW 0x0a0u
-#define FEEDBACK_VELOCITY_FINE_HIGH 0x0a4u
-#define FEEDBACK_VELOCITY_FINE_WIDTH 40
 // rw: what the position is made of
 #define FEEDBACK_POSITION_SOURCE 0x0a8u
 // 1: counts of a and b, 0: phases, if sine and cosine are built; a count is a quarter period
@@ -1418,10 +1407,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_MASK 0x00000008u
 #define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_SHIFT 3
 #define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_WIDTH 1
-// shift of the command: it moves the target by command * 2^trim LSB of position
-#define ACTUATOR_STEP_OUTPUT_TRIM_MASK 0x000000f0u
-#define ACTUATOR_STEP_OUTPUT_TRIM_SHIFT 4
-#define ACTUATOR_STEP_OUTPUT_TRIM_WIDTH 4
+// rw: motion of the target for one count of the command [1/65536 period]
+#define ACTUATOR_STEP_TRIM 0x014u
+#define ACTUATOR_STEP_TRIM_MASK 0x0000ffffu
+#define ACTUATOR_STEP_TRIM_SHIFT 0
+#define ACTUATOR_STEP_TRIM_WIDTH 16
 // rw: steps in one period; a negative sign reverses the direction [2^-32 step/period]
 #define ACTUATOR_STEP_RATIO 0x018u
 #define ACTUATOR_STEP_RATIO_LOW 0x018u
