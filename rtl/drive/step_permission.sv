@@ -25,6 +25,7 @@ module step_permission (
     assign allowed = enable && by_steps && !blocked;
 
 `ifdef FORMAL
+    wire driven = enable && by_steps;
     always_comb begin
         assert (!allowed || (enable && by_steps));
         assert (!(allowed && block_up && target_up));
@@ -32,7 +33,7 @@ module step_permission (
         if (driven && !target_up && !target_down) assert (allowed);
         if (driven && !block_up && !block_down) assert (allowed);
         cover (allowed && block_up && target_down);
-        cover (!allowed && enable && by_steps && target_up);
+        cover (!allowed && driven && target_up);
     end
 `endif
 endmodule
