@@ -48,7 +48,7 @@ module feedback_channel #(
     input  wire         [  5:0] encoder_fault_mask,  // which events are a fault, bits as in events
     // shift of the origin
     input  wire                 shift,               // strobe: move the origin
-    input  wire signed  [ 31:0] shift_periods,       // period, distance of the shift
+    input  wire signed  [ 31:0] shift_periods,       // period, distance of the shift; else 0
     // pins
     input  wire                 a,                   // level of pin a, synchronous to clk
     input  wire                 b,                   // level of pin b, synchronous to clk
@@ -493,7 +493,6 @@ module feedback_channel #(
         .valid   (stepped),
         .step,
         .phase   (step_phase),
-        .shift,
         .shift_periods,
         // position of the scale
         .done    (scale_valid),

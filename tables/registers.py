@@ -64,6 +64,7 @@ class Field:
     meaning: str  # its own words, or those of the register with its name
     on_write: bool  # swmod: a strobe follows a write
     on_read: bool  # swacc: a strobe goes with a read
+    momentary: bool  # its port is 0 in all cycles but that of the strobe of a write
     needs: str  # parameter of the block without which a setting has no bits and reads 0
     signal: str  # its port in the block; a bit of the register's port in a vector
     state: str  # what the block reads: the port itself, or the bits that it holds
@@ -373,6 +374,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         (get("swacc") and "r" not in sw, "swacc is only for what software reads"),
         (get("swmod") and kind != "setting", "swmod is only for what software sets"),
         (needs and kind != "setting", "only a setting may need a parameter"),
+        (get("momentary") and (wide or needs or not get("swmod")), "momentary is for swmod alone"),
         (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
         (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
         (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),
@@ -396,6 +398,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         meaning=text or (words if name == "value" else f"{words}: {name.replace('_', ' ')}"),
         on_write=bool(get("swmod")),
         on_read=bool(get("swacc")),
+        momentary=bool(get("momentary")),
         needs=needs,
         signal=signal,
         state=signal.replace(parent, parent + held, 1) if vector else port + held,

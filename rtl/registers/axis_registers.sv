@@ -90,10 +90,10 @@ module axis_registers #(
     logic [15:0] target_high;
     logic        zero_crossing_up_held;
     logic        zero_crossing_down_held;
-    logic [31:0] rejected_pulses_count;
-    wire  [32:0] rejected_pulses_next = {1'b0, rejected_pulses_count} + 33'(rejected_pulses);
-    logic [31:0] rejected_samples_count;
-    wire  [32:0] rejected_samples_next = {1'b0, rejected_samples_count} + 33'(rejected_samples);
+    logic [15:0] rejected_pulses_count;
+    wire  [16:0] rejected_pulses_next = {1'b0, rejected_pulses_count} + 17'(rejected_pulses);
+    logic [15:0] rejected_samples_count;
+    wire  [16:0] rejected_samples_next = {1'b0, rejected_samples_count} + 17'(rejected_samples);
     logic        get_state;
     logic        get_faults;
     logic        get_causes_now;
@@ -132,14 +132,14 @@ module axis_registers #(
         zero_crossing_up_held}) | ({32{get_sample}} & {sample_cos, sample_sin}) | ({32{get_phase}} &
         {phase_amplitude, phase_phase}) | ({32{get_quadrature_count}} & quadrature_count) |
         ({32{get_encoder_events}} & {26'd0, encoder_events_held}) | ({32{get_rejected_pulses}} &
-        rejected_pulses_count) | ({32{get_rejected_samples}} & rejected_samples_count) |
-        ({32{get_built}} & {8'd0, built_segments, built_filters, built_fine_stage, built_dac,
-        built_stepper, built_bridge, built_drive, built_velocity, built_encoder_check,
-        built_compare, built_capture, built_recorder, built_harmonics, built_monitor, built_sine}) |
-        ({32{get_following_error}} & following_error) | ({32{get_command}} & {16'd0, command}) |
-        {{16{(get_fault_position_high && fault_position_high[15]) || (get_position_high &&
-        position_high[15]) || (get_target_high && target_high[15]) || (get_command &&
-        command[15])}}, 16'd0};
+        {16'd0, rejected_pulses_count}) | ({32{get_rejected_samples}} & {16'd0,
+        rejected_samples_count}) | ({32{get_built}} & {8'd0, built_segments, built_filters,
+        built_fine_stage, built_dac, built_stepper, built_bridge, built_drive, built_velocity,
+        built_encoder_check, built_compare, built_capture, built_recorder, built_harmonics,
+        built_monitor, built_sine}) | ({32{get_following_error}} & following_error) |
+        ({32{get_command}} & {16'd0, command}) | {{16{(get_fault_position_high &&
+        fault_position_high[15]) || (get_position_high && position_high[15]) || (get_target_high &&
+        target_high[15]) || (get_command && command[15])}}, 16'd0};
 
     always_ff @(posedge clk) begin
         get_state <= get && word == 6'h02;
@@ -177,7 +177,7 @@ module axis_registers #(
         strobes_controlled_stop <= put && word == 6'h01 && wdata[3];
         strobes_arm <= put && word == 6'h01 && wdata[4];
         shift_origin_written <= put && word == 6'h0F;
-        if (put && word == 6'h0F) shift_origin <= wdata[31:0];
+        shift_origin <= put && word == 6'h0F ? wdata[31:0] : '0;
         zero_crossing_up_held <= zero_crossing_up || (zero_crossing_up_held && !(put && word ==
             6'h10 && wdata[0]));
         zero_crossing_down_held <= zero_crossing_down || (zero_crossing_down_held && !(put && word
@@ -201,10 +201,10 @@ module axis_registers #(
         encoder_events_held[5] <= encoder_events[5] || (encoder_events_held[5] && !(put && word ==
             6'h17 && wdata[5]));
         if (put && word == 6'h18) encoder_fault_mask <= wdata[5:0];
-        if (put && word == 6'h19) rejected_pulses_count <= 32'(rejected_pulses);
-        else if (!rejected_pulses_next[32]) rejected_pulses_count <= rejected_pulses_next[31:0];
-        if (put && word == 6'h1A) rejected_samples_count <= 32'(rejected_samples);
-        else if (!rejected_samples_next[32]) rejected_samples_count <= rejected_samples_next[31:0];
+        if (put && word == 6'h19) rejected_pulses_count <= 16'(rejected_pulses);
+        else if (!rejected_pulses_next[16]) rejected_pulses_count <= rejected_pulses_next[15:0];
+        if (put && word == 6'h1A) rejected_samples_count <= 16'(rejected_samples);
+        else if (!rejected_samples_next[16]) rejected_samples_count <= rejected_samples_next[15:0];
 
         if (rst) begin
             get_state <= 1'b0;

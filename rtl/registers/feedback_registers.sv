@@ -241,7 +241,7 @@ module feedback_registers #(
         if (put && word == 6'h2A) position_source_counts <= wdata[0];
         if (put && word == 6'h2A) position_source_steps <= wdata[1];
         align_written <= put && word == 6'h2B;
-        if (put && word == 6'h2B) align <= wdata[2:0];
+        align <= put && word == 6'h2B ? wdata[2:0] : '0;
         if (put && word == 6'h2C) segment_use_enable <= wdata[0];
         if (put && word == 6'h2C) segment_use_linear <= wdata[1];
         if (put && word == 6'h2C) segment_use_segments <= wdata[9:2];

@@ -159,7 +159,7 @@ int rate(uint64_t seed) {
     const int64_t origin = whole(start) - bench.driver.count;
     int64_t position = start, clks = 0, edges = 0, first = 0, last = 0;
     double jitter = 0;
-    while (clks < 4'000'000) {
+    while (clks < 4'000'000 + period) {
         position += slope;
         bench.line(position, unsigned(period), [&] {
             clks++;

@@ -216,7 +216,7 @@ async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut
                 await FallingEdge(dut.clk)
             dut.shift.value, dut.shift_periods.value = 1, periods
             await FallingEdge(dut.clk)
-            dut.shift.value = 0
+            dut.shift.value = dut.shift_periods.value = 0
             await bench.go([])
             assert bench.position() == periods * 4 * QUARTER + QUARTER
 
@@ -357,7 +357,7 @@ async def a_shift_moves_the_segment_table_with_the_scale(dut):
     assert bench.position() == 20 * QUARTER - 400
     dut.shift.value, dut.shift_periods.value = 1, -7
     await FallingEdge(dut.clk)
-    dut.shift.value = 0
+    dut.shift.value = dut.shift_periods.value = 0
     await bench.go([])
     assert bench.position() == -8 * QUARTER - 400
     await bench.go([1] * 10)

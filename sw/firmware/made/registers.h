@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xc18c3066u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x65de9728u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -787,16 +787,17 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_ENCODER_FAULT_MASK_MASK 0x0000003fu
 #define AXIS_ENCODER_FAULT_MASK_SHIFT 0
 #define AXIS_ENCODER_FAULT_MASK_WIDTH 6
-// rw: pulses of a, b or z that the filter rejected; writing clears the count
+// rw: pulses of a, b or z that the filter rejected; writing clears the count, which stops at its
+// largest value
 #define AXIS_REJECTED_PULSES 0x064u
-#define AXIS_REJECTED_PULSES_MASK 0xffffffffu
+#define AXIS_REJECTED_PULSES_MASK 0x0000ffffu
 #define AXIS_REJECTED_PULSES_SHIFT 0
-#define AXIS_REJECTED_PULSES_WIDTH 32
+#define AXIS_REJECTED_PULSES_WIDTH 16
 // rw: samples that the outlier filter rejected; writing clears the count
 #define AXIS_REJECTED_SAMPLES 0x068u
-#define AXIS_REJECTED_SAMPLES_MASK 0xffffffffu
+#define AXIS_REJECTED_SAMPLES_MASK 0x0000ffffu
 #define AXIS_REJECTED_SAMPLES_SHIFT 0
-#define AXIS_REJECTED_SAMPLES_WIDTH 32
+#define AXIS_REJECTED_SAMPLES_WIDTH 16
 // r: what is built; 1: the axis has it
 #define AXIS_BUILT 0x06cu
 // HAS_SINE: sine and cosine; 0: the position is made of counts

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xC18C3066  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x65DE9728  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -952,13 +952,14 @@ FIELDS = (
     ),
     Field(
         "axis", "rejected_pulses", "value",
-        0x64, 0, 32, False, "rw", "",
+        0x64, 0, 16, False, "rw", "",
         Fraction(1, 1),
-        "pulses of a, b or z that the filter rejected; writing clears the count",
+        "pulses of a, b or z that the filter rejected; writing clears the count, which stops "
+        "at its largest value",
     ),
     Field(
         "axis", "rejected_samples", "value",
-        0x68, 0, 32, False, "rw", "",
+        0x68, 0, 16, False, "rw", "",
         Fraction(1, 1),
         "samples that the outlier filter rejected; writing clears the count",
     ),
