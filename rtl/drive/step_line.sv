@@ -59,6 +59,7 @@ module step_line (
         off  <= rst || !enable ? 2'b11 : {off[1] && (off[0] || !valid), off[0] && !tick};
         if (!past) assume (rst);
         if (past) begin
+            assert (off[0] == lost && (!off[1] || fresh));
             assert (!(go && restart));
             assert (!(go && (off[1] || !given)));
             if (!$past(rst) && !$past(valid)) assert (target == $past(target));
