@@ -118,7 +118,7 @@ module feedback_channel #(
     wire phases, record, recorder_read;
     // settings of the position
     wire use_counts, own_steps, align_written;
-    wire signed [ 2:0] align;
+    wire signed [2:0] align;
     // settings of the segment table
     wire segment_enable, segment_linear, segment_origin_written, segment_point_written;
     wire segment_read;

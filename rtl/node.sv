@@ -260,9 +260,9 @@ module node #(
 
     if (HAS_VELOCITY % (1 << AXES) != 0) begin : g_engine
         wire ready, setting_write, setting_waits;
-        wire [2:0] setting_axis;
-        wire [6:0] setting_word;
-        wire [1:0] setting_filter;
+        wire        [ 2:0] setting_axis;
+        wire        [ 6:0] setting_word;
+        wire        [ 1:0] setting_filter;
         wire signed [63:0] setting;
         wire [AXES-1:0] gains_changed, push;
         wire signed [47:0] shift_by;

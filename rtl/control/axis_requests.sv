@@ -8,12 +8,12 @@
 `default_nettype none
 
 module axis_requests (
-    input  wire  closed_loop,             // level: the servo commands the drive
-    input  wire  fine,                    // level: the fine stage holds the position
-    input  wire  start,                   // strobe: the registers start the queued segments
-    input  wire  common_start,            // strobe: the node starts the queued segments
-    output logic check_following,         // level: the following error is checked
-    output logic play                     // strobe: play the queued segments
+    input  wire  closed_loop,      // level: the servo commands the drive
+    input  wire  fine,             // level: the fine stage holds the position
+    input  wire  start,            // strobe: the registers start the queued segments
+    input  wire  common_start,     // strobe: the node starts the queued segments
+    output logic check_following,  // level: the following error is checked
+    output logic play              // strobe: play the queued segments
 );
     assign check_following = closed_loop || fine;
     assign play            = start || common_start;

@@ -49,7 +49,7 @@ module engine_bus #(
     // of the map: 24 blocks of axes from 0x400 on, eight of each kind
     wire [7:0] block = address[13:6] - 8'd4;
     wire [2:0] axis = block[2:0];
-    wire of_axis = block < 8'd24 && {1'b0, axis} < 4'(AXES);
+    wire       of_axis = block < 8'd24 && {1'b0, axis} < 4'(AXES);
     wire [6:0] number;
     wire [2:0] scale;
     wire of_engine, wide, has_sign, gain, segment, filter_address, filter_value;
@@ -121,8 +121,9 @@ module engine_bus #(
         if (!past) assume (rst);
         // the memory stores nothing while hold is high; the engine waits from setting_write on
         if (hold) assume (!stores);
-        if (past && $past(setting_write) && !$past(rst)) assume (setting_waits);
-        else if (past && !$past(setting_waits)) assume (!setting_waits);
+        if (past && $past(setting_write) && !$past(rst))
+            assume (setting_waits);
+            else if (past && !$past(setting_waits)) assume (!setting_waits);
         owed <= !rst && ((take && segment) || (owed && push == '0));
         if (take && segment) owed_axis <= axis;
         if (past) begin
@@ -130,8 +131,9 @@ module engine_bus #(
             if (setting_write) assert (hold && waits && setting_axis == $past(axis));
             if (pushes) assert (setting_axis == owed_axis && !push[owed_axis[$clog2(AXES)-1:0]]);
             if (owed || pushes) assert ({1'b0, owed_axis} < 4'(AXES));
-            if (owed) assert (waits && (pushes || push == (AXES'(1) << owed_axis)));
-            else assert (!pushes && push == '0);
+            if (owed)
+                assert (waits && (pushes || push == (AXES'(1) << owed_axis)));
+                else assert (!pushes && push == '0);
             assert ((push & (push - 1'b1)) == '0);
             if (push != '0) assert (!$past(setting_waits) && !$past(setting_write));
             cover (push != '0 && $past(setting_waits, 2));

@@ -14,32 +14,32 @@ module engine_outputs (
     input  wire                clk,
     input  wire                rst,
     // motion_engine
-    input  wire                valid,            // strobe: result is new, and of this axis
-    input  wire         [ 2:0] kind,             // number of what it is
-    input  wire signed  [47:0] result,           // value
-    input  wire                flag,             // level: its flag
-    input  wire                waits,            // level: a request of this axis is not done yet
+    input  wire                valid,          // strobe: result is new, and of this axis
+    input  wire         [ 2:0] kind,           // number of what it is
+    input  wire signed  [47:0] result,         // value
+    input  wire                flag,           // level: its flag
+    input  wire                waits,          // level: a request of this axis is not done yet
     // the profile
-    output logic               moving,           // level: a profile is being played
-    output logic               armed,            // level: it waits for start_at
-    output logic        [ 4:0] queue_free,       // segments that can be queued
-    output logic               pending,          // level: a request is not done and shown
-    output logic signed [47:0] target,           // 2^-16 period
-    output logic               target_up,        // level: the target moves up
-    output logic               target_down,      // level: the target moves down
-    output logic               underrun,         // strobe: a segment is missing
+    output logic               moving,         // level: a profile is being played
+    output logic               armed,          // level: it waits for start_at
+    output logic        [ 4:0] queue_free,     // segments that can be queued
+    output logic               pending,        // level: a request is not done and shown
+    output logic signed [47:0] target,         // 2^-16 period
+    output logic               target_up,      // level: the target moves up
+    output logic               target_down,    // level: the target moves down
+    output logic               underrun,       // strobe: a segment is missing
     // the servo
-    output logic signed [31:0] velocity,         // 2^-16 period/tick
-    output logic signed [31:0] error,            // 2^-16 period, target - position
-    output logic               saturated,        // level: the command is at its limit
-    output logic               error_valid,      // strobe: error is new in the next cycle
-    output logic               too_far,          // level: with error_valid, it is above its limit
-    output logic               command_valid,    // strobe: command is new
-    output logic signed [15:0] command,          // full scale 2^15, with command_valid
+    output logic signed [31:0] velocity,       // 2^-16 period/tick
+    output logic signed [31:0] error,          // 2^-16 period, target - position
+    output logic               saturated,      // level: the command is at its limit
+    output logic               error_valid,    // strobe: error is new in the next cycle
+    output logic               too_far,        // level: with error_valid, it is above its limit
+    output logic               command_valid,  // strobe: command is new
+    output logic signed [15:0] command,        // full scale 2^15, with command_valid
     // motor steps
-    output logic               steps_valid,      // strobe: steps_target is new
-    output logic               steps_restart,    // level: with steps_valid, restart there
-    output logic signed [47:0] steps_target      // 2^-16 motor step, with steps_valid
+    output logic               steps_valid,    // strobe: steps_target is new
+    output logic               steps_restart,  // level: with steps_valid, restart there
+    output logic signed [47:0] steps_target    // 2^-16 motor step, with steps_valid
 );
     // as in tables/engine_microcode.py
     localparam [2:0] STATE = 3'd0, TARGET = 3'd1, TARGET_VELOCITY = 3'd2, VELOCITY = 3'd3;

@@ -41,10 +41,10 @@
 `default_nettype none
 
 module motion_engine #(
-    parameter  int AXES    = 1,                    // axes, 1 to 8
-    parameter  int FILTERS = 0,                    // filters of each servo, 0 to 4
-    parameter  int TICK_CYCLES = 0,                // cycles between two ticks; 0: not checked
-    localparam int WORD_W  = FILTERS == 0 ? 7 : 8  // bits of the address of a word of an axis
+    parameter  int AXES        = 1,                    // axes, 1 to 8
+    parameter  int FILTERS     = 0,                    // filters of each servo, 0 to 4
+    parameter  int TICK_CYCLES = 0,                    // cycles between two ticks; 0: not checked
+    localparam int WORD_W      = FILTERS == 0 ? 7 : 8  // bits of the address of a word of an axis
 ) (
     input  wire                       clk,
     input  wire                       rst,

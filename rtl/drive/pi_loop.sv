@@ -19,20 +19,20 @@
 `default_nettype none
 
 module pi_loop (
-    input  wire               clk,
-    input  wire               rst,
-    input  wire               power,          // level: commands pass to the drive
-    input  wire               closed_loop,    // level: 0: command is open_command
-    input  wire        [23:0] kp,             // 2^-16 command/LSB of position
-    input  wire        [23:0] ki,             // 2^-24 command/LSB of position, each tick
-    input  wire        [14:0] limit,          // largest |command| and |integral|, full scale 2^15
-    input  wire               gains_changed,  // strobe: kp is new, +-1 cycle
-    input  wire               tick,           // strobe: take the inputs
-    input  wire signed [47:0] target,         // 2^-16 period
-    input  wire signed [47:0] position,       // 2^-16 period
-    input  wire signed [15:0] open_command,   // full scale 2^15, the open-loop command
-    output logic              valid,          // strobe: command is new
-    output logic signed [15:0] command        // full scale 2^15
+    input  wire                clk,
+    input  wire                rst,
+    input  wire                power,          // level: commands pass to the drive
+    input  wire                closed_loop,    // level: 0: command is open_command
+    input  wire         [23:0] kp,             // 2^-16 command/LSB of position
+    input  wire         [23:0] ki,             // 2^-24 command/LSB of position, each tick
+    input  wire         [14:0] limit,          // largest |command| and |integral|, full scale 2^15
+    input  wire                gains_changed,  // strobe: kp is new, +-1 cycle
+    input  wire                tick,           // strobe: take the inputs
+    input  wire signed  [47:0] target,         // 2^-16 period
+    input  wire signed  [47:0] position,       // 2^-16 period
+    input  wire signed  [15:0] open_command,   // full scale 2^15, the open-loop command
+    output logic               valid,          // strobe: command is new
+    output logic signed [15:0] command         // full scale 2^15
 );
     enum logic [2:0] {
         WAIT,
@@ -42,12 +42,12 @@ module pi_loop (
         GIVE
     } state;
 
-    logic       [ 4:0] step;  // cycle within a product
-    logic              proportional;  // the second term is being added
+    logic [4:0] step;  // cycle within a product
+    logic proportional;  // the second term is being added
     logic signed [31:0] error;  // 2^-16 period; saturates
-    logic              stale;  // there was no power in some cycle since the inputs were taken
+    logic stale;  // there was no power in some cycle since the inputs were taken
     logic signed [63:0] operand;  // shifted left
-    logic       [23:0] gain;  // shifted right
+    logic [23:0] gain;  // shifted right
     // 2^-16 command; 2^-24 command while it is the integral
     logic signed [65:0] total;
     logic signed [39:0] integral;  // 2^-24 command
@@ -60,38 +60,38 @@ module pi_loop (
     logic signed [31:0] sum;
 
     wire                take = state == WAIT && tick;
-    wire signed [48:0]  distance = {target[47], target} - {position[47], position};
+    wire signed  [48:0] distance = {target[47], target} - {position[47], position};
     wire                fits = distance[48:31] == {18{distance[48]}};
-    wire signed [31:0]  nearest_error = {distance[48], {31{~distance[48]}}};
+    wire signed  [31:0] nearest_error = {distance[48], {31{~distance[48]}}};
     wire                powerless = !closed_loop || !power;
     wire                into_limit = error[31] ? limited_down : limited_up;
 
-    wire signed [65:0]  integral_high = {27'd0, limit, 24'd0};
-    wire signed [65:0]  from_low = total < -integral_high ? -integral_high : total;
-    wire signed [65:0]  new_integral = total > integral_high ? integral_high : from_low;
+    wire signed  [65:0] integral_high = {27'd0, limit, 24'd0};
+    wire signed  [65:0] from_low = total < -integral_high ? -integral_high : total;
+    wire signed  [65:0] new_integral = total > integral_high ? integral_high : from_low;
 
     wire                no_power = stale || powerless;
     wire                retakes = (fresh || changed || changed_taken || gains_changed) && ki != '0;
     wire                hold = no_power || retakes;
     // 2^0 command
-    wire signed [49:0]  asked = hold ? {{34{sum[31]}}, sum[31:16]} : total[65:16];
-    wire signed [49:0]  high = {35'd0, limit};
+    wire signed  [49:0] asked = hold ? {{34{sum[31]}}, sum[31:16]} : total[65:16];
+    wire signed  [49:0] high = {35'd0, limit};
     wire                too_high = asked > high;
     wire                too_low = asked < -high;
-    wire signed [31:0]  most = {1'b0, limit, 16'd0};
-    wire signed [31:0]  computed = {asked[15:0], hold ? sum[15:0] : total[15:0]};
+    wire signed  [31:0] most = {1'b0, limit, 16'd0};
+    wire signed  [31:0] computed = {asked[15:0], hold ? sum[15:0] : total[15:0]};
 
     wire                total_fits = total[65:33] == {33{total[65]}};
-    wire signed [33:0]  total_near = total_fits ? total[33:0] : {total[65], {33{~total[65]}}};
-    wire signed [34:0]  jump = {{3{sum[31]}}, sum} - {total_near[33], total_near};
+    wire signed  [33:0] total_near = total_fits ? total[33:0] : {total[65], {33{~total[65]}}};
+    wire signed  [34:0] jump = {{3{sum[31]}}, sum} - {total_near[33], total_near};
 
     // the limit may have changed since the sum was limited
-    wire signed [15:0]  summed = sum[31:16];
+    wire signed  [15:0] summed = sum[31:16];
     wire                above = summed > $signed({1'b0, limit});
     wire                below = summed < -$signed({1'b0, limit});
-    wire signed [15:0]  not_below = below ? -{1'b0, limit} : summed;
-    wire signed [15:0]  closed_command = above ? {1'b0, limit} : not_below;
-    wire signed [15:0]  new_command = closed_loop ? closed_command : open_command;
+    wire signed  [15:0] not_below = below ? -{1'b0, limit} : summed;
+    wire signed  [15:0] closed_command = above ? {1'b0, limit} : not_below;
+    wire signed  [15:0] new_command = closed_loop ? closed_command : open_command;
 
     always_ff @(posedge clk) begin
         valid <= state == GIVE;

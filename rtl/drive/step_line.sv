@@ -18,20 +18,20 @@
 module step_line (
     input  wire                clk,
     input  wire                rst,
-    input  wire                enable,       // level: the drive is on
-    input  wire                tick,         // strobe: servo tick
+    input  wire                enable,      // level: the drive is on
+    input  wire                tick,        // strobe: servo tick
     // the target of this tick
-    input  wire                valid,        // strobe: it is new
-    input  wire                restart_in,   // level: restart there
-    input  wire signed  [47:0] target_in,    // 2^-16 step
-    input  wire                up_in,        // level: the target of the axis moves up
-    input  wire                down_in,      // level: the target of the axis moves down
+    input  wire                valid,       // strobe: it is new
+    input  wire                restart_in,  // level: restart there
+    input  wire signed  [47:0] target_in,   // 2^-16 step
+    input  wire                up_in,       // level: the target of the axis moves up
+    input  wire                down_in,     // level: the target of the axis moves down
     // the line
-    output logic               go,           // strobe: draw a line to target
-    output logic               restart,      // strobe: begin a line at target
-    output logic signed [47:0] target,       // 2^-16 step
-    output logic               target_up,    // level: the line leads up
-    output logic               target_down   // level: the line leads down
+    output logic               go,          // strobe: draw a line to target
+    output logic               restart,     // strobe: begin a line at target
+    output logic signed [47:0] target,      // 2^-16 step
+    output logic               target_up,   // level: the line leads up
+    output logic               target_down  // level: the line leads down
 );
     // there is a target; it is not the end of a line; the drive was off since the tick
     logic given, fresh, lost;
@@ -52,7 +52,7 @@ module step_line (
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic       past = 1'b0;
     logic [1:0] off = 2'b11;  // the drive was off: since the tick, and then until a target came
     always @(posedge clk) begin
         past <= 1'b1;

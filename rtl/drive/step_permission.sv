@@ -12,14 +12,14 @@
 `default_nettype none
 
 module step_permission (
-    input  wire               enable,           // level: the interlock enables the drive
-    input  wire               by_steps,         // level: the drive is a stepper driver
-    input  wire               block_up,         // level: the interlock blocks upward motion
-    input  wire               block_down,       // level: the interlock blocks downward motion
-    input  wire               target_up,        // level: the target moves up
-    input  wire               target_down,      // level: the target moves down
-    output logic              driven,           // level: the drive is on and is a stepper driver
-    output logic              allowed           // level: the target may be followed
+    input  wire  enable,       // level: the interlock enables the drive
+    input  wire  by_steps,     // level: the drive is a stepper driver
+    input  wire  block_up,     // level: the interlock blocks upward motion
+    input  wire  block_down,   // level: the interlock blocks downward motion
+    input  wire  target_up,    // level: the target moves up
+    input  wire  target_down,  // level: the target moves down
+    output logic driven,       // level: the drive is on and is a stepper driver
+    output logic allowed       // level: the target may be followed
 );
     wire blocked = (target_down && block_down) || (target_up && block_up);
 

@@ -36,17 +36,17 @@ module register_memory #(
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire         hold,          // level: no first value is stored
-    input  wire         select,    // strobe: an access to any block
-    input  wire         write,     // level: it writes wdata
-    input  wire  [13:0] address,   // word of the register map
-    input  wire  [31:0] wdata,     // value to write
-    output logic        ready,     // level: the settings have their first values
-    output logic [31:0] rdata,     // settings in the word read last; its other bits are 0
-    output logic [31:0] wdata_low,     // low word that waits for its high word
-    output logic        stores,        // strobe: a word is stored
-    output logic [13:0] stored_at,     // word of the register map
-    output logic [31:0] stored_value   // bits of its settings
+    input  wire         hold,         // level: no first value is stored
+    input  wire         select,       // strobe: an access to any block
+    input  wire         write,        // level: it writes wdata
+    input  wire  [13:0] address,      // word of the register map
+    input  wire  [31:0] wdata,        // value to write
+    output logic        ready,        // level: the settings have their first values
+    output logic [31:0] rdata,        // settings in the word read last; its other bits are 0
+    output logic [31:0] wdata_low,    // low word that waits for its high word
+    output logic        stores,       // strobe: a word is stored
+    output logic [13:0] stored_at,    // word of the register map
+    output logic [31:0] stored_value  // bits of its settings
 );
     localparam int W = $clog2(3 + 3 * AXES) + 6;  // bits of a place in the memory
 

@@ -42,8 +42,8 @@ module axis_bench #(
     wire [13:0] stored_at;
     wire [31:0] stored_value, wdata_low, settings, live, feedback_rdata, actuator_rdata;
     wire [2:0] setting_axis, result_axis, result_kind;
-    wire [6:0] setting_word;
-    wire [1:0] setting_filter;
+    wire        [ 6:0] setting_word;
+    wire        [ 1:0] setting_filter;
     wire signed [63:0] setting;
     wire gains_changed, push, pending, moves, moved, request_waits, busy, overrun;
     wire step_made, step_down, block_up, block_down, closed_loop, play, arm, controlled_stop;

@@ -52,9 +52,10 @@ static_assert(LIMIT_LOW == 0 && LIMIT_HIGH == 1 && ESTOP == 2 && FOLLOWING == 3 
                   WATCHDOG == 5 && DRIVE == 6 && CPU == 7 && UNDERRUN == 8 && OVERRUN == 9 &&
                   SERVO == 10,
               "NAMES has the order of axis.faults");
-const char* const NAMES[CAUSES] = {"limit_low",        "limit_high",   "estop", "following_error",
-                                   "encoder",          "bus_watchdog", "drive", "cpu",
-                                   "profile_underrun", "step_overrun", "servo_overrun"};
+const char* const NAMES[CAUSES] = {"limit_low",       "limit_high",   "estop",
+                                   "following_error", "encoder",      "bus_watchdog",
+                                   "drive",           "cpu",          "profile_underrun",
+                                   "step_overrun",    "servo_overrun"};
 constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU};
 constexpr unsigned LATCH_ALWAYS = 1 << ESTOP | 1 << DRIVE | 1 << CPU;
 

@@ -26,7 +26,7 @@ module profile_bench #(
     output logic              underrun          // strobe: a segment was missing
 );
     wire waits, result_valid, result_flag;
-    wire [2:0] result_kind;
+    wire        [ 2:0] result_kind;
     wire signed [47:0] result;
 
     /* verilator lint_off PINCONNECTEMPTY */

@@ -19,9 +19,7 @@ class StepLine:
         restart = int(self.fresh or not enable)
         return 1 - restart, restart
 
-    def clk(
-        self, rst=0, enable=0, tick=0, valid=0, restart_in=0, target_in=0, up_in=0, down_in=0
-    ):
+    def clk(self, rst=0, enable=0, tick=0, valid=0, restart_in=0, target_in=0, up_in=0, down_in=0):
         if valid:
             self.target, self.given = target_in, True
             self.fresh = bool(restart_in or self.lost)

@@ -110,9 +110,7 @@ async def the_integral_does_not_wind_up_while_the_command_is_at_its_limit(dut):
 
 @cocotb.test()
 async def closing_the_loop_continues_from_the_open_command(dut):
-    loop = await Loop(dut).reset(
-        kp=ONE, ki=1 << 22, closed_loop=0, open_command=3000, target=400
-    )
+    loop = await Loop(dut).reset(kp=ONE, ki=1 << 22, closed_loop=0, open_command=3000, target=400)
     assert await loop.commands(2) == [3000, 3000]
     assert await loop.commands(3, closed_loop=1) == [3000, 3100, 3200]  # 400 / 4 per tick
     assert await loop.commands(1, closed_loop=0, open_command=-20) == [-20]

@@ -151,8 +151,7 @@ static void apply_filters(unsigned axis) {
         for (uint32_t n = 0; n < COEFFICIENTS; n++)
             write_filter(axis, filter, n,
                          (uint32_t)p[BUS_PARAMETER_FILTER_1_B0 + filter * COEFFICIENTS + n]);
-        write_filter(axis, filter, COEFFICIENTS,
-                     (uint32_t)p[BUS_PARAMETER_FILTERS] >> filter & 1u);
+        write_filter(axis, filter, COEFFICIENTS, (uint32_t)p[BUS_PARAMETER_FILTERS] >> filter & 1u);
     }
 }
 
