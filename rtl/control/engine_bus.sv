@@ -79,8 +79,8 @@ module engine_bus #(
 
     wire written = !setting_write && !setting_waits;
 
-    assign hold  = setting_write || setting_waits || !ready;
-    assign waits = hold || pushes || |{push, pending, moves, moved};
+    assign hold  = setting_write || setting_waits || pushes || !ready;
+    assign waits = hold || |{push, pending, moves, moved};
 
     always_ff @(posedge clk) begin
         setting_write <= take;
@@ -125,10 +125,12 @@ module engine_bus #(
             assume (setting_waits);
             else if (past && !$past(setting_waits)) assume (!setting_waits);
         owed <= !rst && ((take && segment) || (owed && push == '0));
-        if (take) owed_axis <= axis;
+        if (take && segment) owed_axis <= axis;
         if (past) begin
             assert (setting_write == ($past(take) && !$past(rst)));
-            if (setting_write) assert (hold && waits && setting_axis == owed_axis);
+            if (setting_write) assert (hold && waits && setting_axis == $past(axis));
+            if (pushes) assert (setting_axis == owed_axis && !push[owed_axis[$clog2(AXES)-1:0]]);
+            if (owed || pushes) assert ({1'b0, owed_axis} < 4'(AXES));
             if (owed)
                 assert (waits && (pushes || push == (AXES'(1) << owed_axis)));
                 else assert (!pushes && push == '0);

@@ -73,7 +73,7 @@ module axis_registers #(
     input  wire                built_capture,                   // HAS_CAPTURE
     input  wire                built_compare,                   // HAS_COMPARE: compare pulses
     input  wire                built_encoder_check,             // HAS_ENCODER_CHECK
-    input  wire                built_velocity,                  // HAS_VELOCITY: velocity estimator
+    input  wire                built_velocity,                  // HAS_VELOCITY: measured velocity
     input  wire                built_drive,                     // HAS_DRIVE
     input  wire                built_bridge,                    // HAS_BRIDGE: bridge
     input  wire                built_stepper,                   // HAS_STEPPER: step generator

@@ -25,8 +25,8 @@ class EngineBus:
 
     def waits(self, ready=1, setting_waits=0, pending=0, moves=0, moved=0):
         """(hold, waits)"""
-        hold = bool(self.setting) or setting_waits or not ready
-        return int(hold), int(hold or self.pushes or self.push | pending | moves | moved > 0)
+        hold = bool(self.setting) or setting_waits or self.pushes or not ready
+        return int(hold), int(hold or self.push | pending | moves | moved > 0)
 
     def word_of(self, address):
         """(axis, word) of an address of the map, or None."""

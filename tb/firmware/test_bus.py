@@ -225,13 +225,14 @@ def test_start_writes_the_defaults_into_the_registers():
         "kd",
         "kv",
         "ka",
+        "output_limit",
+        "integral_limit",
         "dead_band",
         "following_limit",
         "disagreement_limit",
         "encoder_fault_mask",
     ):
         assert word[d["AXIS_" + name.upper()]] == default[name]
-    assert word[d["AXIS_SERVO_LIMITS"]] == default["output_limit"] | default["integral_limit"] << 15
     assert (
         word[d["AXIS_AMPLITUDE_WINDOW"]]
         == default["amplitude_low"] | default["amplitude_high"] << 16

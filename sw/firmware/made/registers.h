@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x65de9728u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xe1fff810u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -828,7 +828,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_BUILT_ENCODER_CHECK_MASK 0x00000040u
 #define AXIS_BUILT_ENCODER_CHECK_SHIFT 6
 #define AXIS_BUILT_ENCODER_CHECK_WIDTH 1
-// HAS_VELOCITY: velocity estimator
+// HAS_VELOCITY: measured velocity
 #define AXIS_BUILT_VELOCITY_MASK 0x00000080u
 #define AXIS_BUILT_VELOCITY_SHIFT 7
 #define AXIS_BUILT_VELOCITY_WIDTH 1

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x65DE9728  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xE1FFF810  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -1010,7 +1010,7 @@ FIELDS = (
         "axis", "built", "velocity",
         0x6C, 7, 1, False, "r", "",
         Fraction(1, 1),
-        "HAS_VELOCITY: velocity estimator",
+        "HAS_VELOCITY: measured velocity",
     ),
     Field(
         "axis", "built", "drive",
