@@ -57,17 +57,30 @@ module drive_interlock (
     // end of the made constants
 
     // the last error that counted was above the limit
-    logic too_far;
+    logic        too_far;
     // the next error was measured with the drive on
-    logic error_counts;
+    logic        error_counts;
 
-    wire [10:0] arrived = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
-    wire [10:0] held = reset_faults && !enable_request ? faults & causes_now : faults;
-    wire [10:0] latched = held | arrived;
-    wire allowed = enable_request && latched == '0;
+    wire  [10:0] arrived = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
+    wire  [10:0] held = reset_faults && !enable_request ? faults & causes_now : faults;
+    wire  [10:0] latched = held | arrived;
+    wire         allowed = enable_request && latched == '0;
 
-    wire signed [15:0] command = valid_in ? command_in : command_out;
-    wire blocked = !allowed || (limit_high && command > 0) || (limit_low && command < 0);
+    // command_out is positive, negative; so is the command of this cycle
+    logic positive, negative;
+    wire         up = valid_in ? !command_in[15] && command_in != '0 : positive;
+    wire         down = valid_in ? command_in[15] : negative;
+    wire         blocked = !allowed || (limit_high && up) || (limit_low && down);
+
+    logic [10:0] lowest;  // of the causes that have arrived
+    logic        lower;
+    always_comb begin
+        lower = 1'b0;
+        for (int n = 0; n < 11; n++) begin
+            lowest[n] = arrived[n] && !lower;
+            lower     = lower || arrived[n];
+        end
+    end
 
     assign causes_now = {
         servo_overrun,
@@ -97,12 +110,14 @@ module drive_interlock (
         faults  <= latched;
         enabled <= allowed;
         if (held == '0) begin
-            first_fault <= arrived & (~arrived + 1'b1);
+            first_fault <= lowest;
             if (arrived != '0) fault_position <= position;
         end
 
-        command_out <= blocked ? '0 : command;
-        valid_out   <= valid_in || (blocked && command_out != '0);
+        if (valid_in) command_out <= command_in;
+        {positive, negative} <= {up, down};
+        if (blocked) {command_out, positive, negative} <= '0;
+        valid_out <= valid_in || (blocked && (positive || negative));
         if (rst) begin
             too_far        <= 1'b0;
             error_counts   <= 1'b0;
@@ -111,6 +126,7 @@ module drive_interlock (
             first_fault    <= '0;
             fault_position <= '0;
             command_out    <= '0;
+            {positive, negative} <= '0;
             valid_out      <= 1'b0;
         end
     end
@@ -121,6 +137,7 @@ module drive_interlock (
         past <= 1'b1;
         if (!past) assume (rst);
         if (past) begin
+            assert (positive == (command_out > 0) && negative == (command_out < 0));
             assert (!(enabled && faults != '0));
             assert (!enabled || ($past(enable_request) && $past(causes_now) == '0));
             assert (command_out == '0 || enabled);
