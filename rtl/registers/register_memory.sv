@@ -33,7 +33,7 @@ module register_memory #(
     parameter int HAS_RECORDER      = 255,  // axes with a recorder
     parameter int HAS_SINE          = 255,  // axes with sine and cosine
     parameter int HAS_STEPPER       = 255,  // axes with a step generator
-    parameter int HAS_VELOCITY      = 255   // axes with a velocity estimator
+    parameter int HAS_VELOCITY      = 255   // axes with a measured velocity
 ) (
     input  wire         clk,
     input  wire         rst,

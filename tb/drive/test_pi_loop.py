@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pi_loop: both terms by hand, anti-windup, bumpless transfer when loop, power or gains change, both
-ends of the ranges, and random ticks against the model in every cycle.
+"""pi_loop: both terms by hand, anti-windup, bumpless transfer when loop, power or gains change,
+both ends of the ranges, and random ticks against the model in every cycle.
 """
 
 import random
