@@ -79,7 +79,6 @@ SETTINGS = (  # written by the register bus
     "trim_scale",
     "quantum",
     "start_at",
-    "shift_by",
     "segment_velocity",
     "segment_acceleration",
     "segment_jerk",
@@ -136,6 +135,7 @@ OUTSIDE = ("0", "product", "product_high", "product_low", "halve") + (
     "period",
     "now",
     "flags",
+    "shift_by",
 )
 OPERANDS = (  # how a line names what it adds
     {name: number_of(at) for name, at in ADDRESS.items() if at < 128}
@@ -1097,7 +1097,7 @@ def text() -> str:
     ]
     between = worst(lines, 0)[0]
     bounds = [worst(lines, filters) for filters in range(5)]
-    choice = " : ".join(f"FILTERS == {n} ? 16'd{axis}" for n, (_, axis) in enumerate(bounds[:-1]))
+    choice = " : ".join(f"FILTERS == {n} ? {axis}" for n, (_, axis) in enumerate(bounds[:-1]))
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
@@ -1113,8 +1113,9 @@ def text() -> str:
 `default_nettype none
 
 module engine_microcode #(
-    parameter int AXES    = 1,  // axes of the engine, 1 to 8
-    parameter int FILTERS = 0   // filters of each axis, 0 to 4
+    parameter int AXES        = 1,  // axes of the engine, 1 to 8
+    parameter int FILTERS     = 0,  // filters of each axis, 0 to 4
+    parameter int TICK_CYCLES = 0   // cycles between two ticks; 0: not checked
 ) (
     input  wire         clk,
     input  wire  [ 9:0] next,        // number of a line to be read
@@ -1123,9 +1124,14 @@ module engine_microcode #(
     output logic [35:0] target_code, // code of the line `target`
     output logic [15:0] cycles       // cycles that a tick needs at most
 );""",
-            f"    localparam logic [15:0] AXIS = {choice} : 16'd{bounds[-1][1]};",
+            f"    localparam int AXIS = {choice} : {bounds[-1][1]};",
+            f"    localparam int CYCLES = {between} + AXES * AXIS;",
             "",
-            f"    assign cycles = 16'd{between} + 16'(AXES) * AXIS;",
+            "    if (TICK_CYCLES != 0 && TICK_CYCLES < CYCLES) begin : g_check",
+            "        A_SERVO_TICK_HAS_TOO_FEW_CYCLES_FOR_THE_AXES u_error ();",
+            "    end",
+            "",
+            "    assign cycles = 16'(CYCLES);",
             "",
             f'    (* rom_style = "block" *) logic [35:0] lines[0:{LINES - 1}];',
             "",

@@ -14,8 +14,9 @@
 `default_nettype none
 
 module engine_sequencer #(
-    parameter int AXES    = 1,  // axes of the engine, 1 to 8
-    parameter int FILTERS = 0   // filters of each axis, 0 to 4
+    parameter int AXES        = 1,  // axes of the engine, 1 to 8
+    parameter int FILTERS     = 0,  // filters of each axis, 0 to 4
+    parameter int TICK_CYCLES = 0   // cycles between two ticks; 0: not checked
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -62,8 +63,9 @@ module engine_sequencer #(
     wire finishes = action == FINISHED;
 
     engine_microcode #(
-        .AXES   (AXES),
-        .FILTERS(FILTERS)
+        .AXES       (AXES),
+        .FILTERS    (FILTERS),
+        .TICK_CYCLES(TICK_CYCLES)
     ) u_microcode (
         .clk,
         .next,

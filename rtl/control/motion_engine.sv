@@ -30,19 +30,21 @@
 //           length), 1 target in 2^-16 period, 2 its velocity and 3 the measured velocity in 2^-16
 //           period/tick, 4 following error in 2^-16 period (flag: above following_limit), 5 command
 //           (flag: at its limit), 6 target in 2^-16 motor step (flag: restart there), 7 underrun.
-// limits    Settings keep these units: gains 2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16
-//           command, integral_limit 2^-24 command, coefficients 2^-32, stop_deceleration 2^-40
-//           period/tick2, trim_scale 2^-16 period/command, segment_ticks bit 24: the last segment.
-//           A segment, and the amount of a shift, stay as they are while `waits` is high.
+// limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units: gains
+//           2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16 command, integral_limit 2^-24
+//           command, coefficients 2^-32, stop_deceleration 2^-40 period/tick2, trim_scale 2^-16
+//           period/command, segment_ticks bit 24: the last segment. A segment, and shift_by from the
+//           cycle after shift on, stay as they are while `waits` is high.
 // source    forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45;
 //           Ohmae et al., IEEE Trans. IE-29 (1982) 207, count times
 // model     tb/control/motion_engine.py, equal in every result of every tick and request
 `default_nettype none
 
 module motion_engine #(
-    parameter  int AXES    = 1,                    // axes, 1 to 8
-    parameter  int FILTERS = 0,                    // filters of each servo, 0 to 4
-    localparam int WORD_W  = FILTERS == 0 ? 7 : 8  // bits of the address of a word of an axis
+    parameter  int AXES        = 1,                    // axes, 1 to 8
+    parameter  int FILTERS     = 0,                    // filters of each servo, 0 to 4
+    parameter  int TICK_CYCLES = 0,                    // cycles between two ticks; 0: not checked
+    localparam int WORD_W      = FILTERS == 0 ? 7 : 8  // bits of the address of a word of an axis
 ) (
     input  wire                       clk,
     input  wire                       rst,
@@ -70,6 +72,7 @@ module motion_engine #(
     input  wire         [   AXES-1:0] push,                    // strobes: queue the segment
     input  wire         [   AXES-1:0] gains_changed,           // strobes: a gain is new
     input  wire         [   AXES-1:0] shift,                   // strobes: the origin moves
+    input  wire signed  [       47:0] shift_by,                // 2^-16 period, of these axes
     output logic        [   AXES-1:0] waits,                   // level: a request is not done yet
     // results
     output logic                      result_valid,            // strobe: result is new
@@ -98,6 +101,7 @@ module motion_engine #(
     localparam [3:0] Y_HIGH = 4'd11, DIVIDE = 4'd12, UPWARD = 4'd13, ALONG = 4'd14;
     localparam [3:0] PRODUCT = 4'd1, PRODUCT_HIGH = 4'd2, PRODUCT_LOW = 4'd3, HALVE = 4'd4;
     localparam [3:0] POSITION = 4'd5, ELAPSED = 4'd6, PERIOD = 4'd7, NOW = 4'd8, FLAGS = 4'd9;
+    localparam [3:0] SHIFT_BY = 4'd10;
     localparam [7:0] LOAD_CONTEXT = 8'h20, SAMPLE = 8'h23;
     localparam [7:0] STAND = 8'h24, POP = 8'h26, PUSH = 8'h27, EMPTY = 8'h28;
     localparam [7:0] BOOTED = 8'h29, FIRST_FILTER = 8'h2A, NEXT_FILTER = 8'h2B;
@@ -154,8 +158,9 @@ module motion_engine #(
     wire               off = level[2] && level[3];
 
     engine_sequencer #(
-        .AXES   (AXES),
-        .FILTERS(FILTERS)
+        .AXES       (AXES),
+        .FILTERS    (FILTERS),
+        .TICK_CYCLES(TICK_CYCLES)
     ) u_sequencer (
         .clk,
         .rst,
@@ -264,6 +269,7 @@ module motion_engine #(
             PERIOD:   outside = {24'd0, period};
             NOW:      outside = {16'd0, seen_now};
             FLAGS:    outside = {23'd0, queued, head, flags[15:0]};
+            SHIFT_BY: outside = shift_by;
             default:  outside = '0;
         endcase
         case (source)

@@ -9,7 +9,7 @@ the range of a 16-bit and of a 32-bit counter, and compares the counts of every 
 of the scale. It writes build/report/s2.html.
 
 The clock frequency of the node limits the speed of the scale: the node counts one count per cycle.
-The twin runs at 3 MHz, and here X and Y move at 100 mm/s and Z at 25 mm/s. The figure
+The twin runs at 4.8 MHz, and here X and Y move at 100 mm/s and Z at 25 mm/s. The figure
 s2_count_errors measures 500 mm/s, which is 1000 times the top speed of the paper and 1 or 5 million
 counts per second.
 """
@@ -36,7 +36,7 @@ from moire.units import Value
 from twin import BuildError, Twin, TwinTransport
 from twin.nodes.twin import Axis, Node, drives
 
-CLK_HZ = 3_000_000
+CLK_HZ = 4_800_000  # the motion engine needs 1171 cycles a tick for three axes
 NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 POLL_S = 0.02
 SLOW_MM_S = 0.5  # the paper's top speed, 30 mm/min

@@ -30,7 +30,9 @@ module three_axes_bench (
     for (genvar n = 0; n < 3; n++) begin : g_axis
         wire [31:0] actuator_rdata;
         wire adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction, dac_cs_n, dac_sclk, dac_sdi;
-        wire drive_enable, compare_pulse;
+        wire drive_enable, compare_pulse, line_stopped, step_made, step_down, moves, moved, block_up, block_down;
+        wire closed_loop, play, arm, controlled_stop, hold_target, pending;
+        wire [47:0] position, moved_by;
 
         axis #(
             .HAS_BRIDGE    (0),
@@ -42,13 +44,41 @@ module three_axes_bench (
             .clk,
             .rst,
             .tick,
-            .tick_period     (24'd15000),
             .sample_tick,
+            .limit_tick      (1'b0),
             .start           (1'b0),
             .sync            (1'b0),
             .estop           (1'b0),
             .watchdog_expired(1'b0),
             .cpu_stopped     (1'b0),
+            .servo_overrun   (1'b0),
+            // without a motion engine: only positions are read
+            .position,
+            .step_made,
+            .step_down,
+            .moves,
+            .moved,
+            .moved_by,
+            .block_up,
+            .block_down,
+            .closed_loop,
+            .play,
+            .arm,
+            .controlled_stop,
+            .hold_target,
+            .pending,
+            .waits           (1'b0),
+            .result_valid    (1'b0),
+            .result_kind     (3'd0),
+            .result          (48'd0),
+            .result_flag     (1'b0),
+            .line_start      (1'b0),
+            .line_idle       (1'b0),
+            .rate_valid      (1'b0),
+            .rate            (37'd0),
+            .rate_restart    (1'b0),
+            .rate_steep      (1'b0),
+            .line_stopped,
             .select          (select[n]),
             .write,
             .word,
@@ -84,7 +114,13 @@ module three_axes_bench (
 
         wire pins = &{1'b0, adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction};
         wire dac = &{1'b0, dac_cs_n, dac_sclk, dac_sdi};
-        wire unused = &{pins, dac, actuator_rdata, drive_enable, compare_pulse};
+        wire engine = &{
+            1'b0, position, step_made, step_down, moves, moved, moved_by, block_up, block_down,
+            closed_loop, play, arm, controlled_stop, hold_target, pending
+        };
+        wire unused = &{
+            pins, dac, engine, actuator_rdata, drive_enable, compare_pulse, line_stopped
+        };
     end
 
     assign rdata = answer[0] | answer[1] | answer[2] | feedback[0] | feedback[1] | feedback[2];

@@ -225,13 +225,14 @@ def test_start_writes_the_defaults_into_the_registers():
         "kd",
         "kv",
         "ka",
+        "output_limit",
+        "integral_limit",
         "dead_band",
         "following_limit",
         "disagreement_limit",
         "encoder_fault_mask",
     ):
         assert word[d["AXIS_" + name.upper()]] == default[name]
-    assert word[d["AXIS_SERVO_LIMITS"]] == default["output_limit"] | default["integral_limit"] << 15
     assert (
         word[d["AXIS_AMPLITUDE_WINDOW"]]
         == default["amplitude_low"] | default["amplitude_high"] << 16
@@ -239,7 +240,7 @@ def test_start_writes_the_defaults_into_the_registers():
     assert (
         word[d["AXIS_SENSING"]]
         == CLK_HZ // 100_000 | default["outlier_step"] << 16 | default["outlier_hold"] << 24
-    )  # 10 us
+    )  # 10 us, a sample in each cycle
     assert actuator[d["ACTUATOR_PWM_PERIOD"]] == CLK_HZ // 20_000 and word[d["AXIS_CONTROL"]] == 0
     assert word[d["AXIS_STOP_DECELERATION"]] == 125_000 * 2**40 // 4000**2 >> 8
     assert machine.word[d["BUS_BASE"] + d["BUS_BIT_TIME"]] == round(16 * CLK_HZ / 115_200)

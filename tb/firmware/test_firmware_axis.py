@@ -454,7 +454,7 @@ def test_an_axis_without_a_drive_refuses_every_motion_and_still_measures():
     assert not machine.axes[0].word.get(DEFINES["AXIS_CONTROL"], 0)
 
 
-def test_capture_and_compare_that_were_not_built_are_refused_and_the_index_is_not():
+def test_captures_compare_and_check_that_were_not_built_are_refused_and_the_index_is_not():
     base = DEFINES["FEEDBACK_BASE"]
     sources, strobes = (
         base + DEFINES["FEEDBACK_CAPTURE_SOURCES"],
@@ -469,9 +469,10 @@ def test_capture_and_compare_that_were_not_built_are_refused_and_the_index_is_no
         *((base + DEFINES[f"FEEDBACK_COMPARE_{name}"], 1) for name in ("COUNT", "PULSE", "GAP")),
     ]
     always = [(sources, 1), (strobes, mask["ARM_INDEX"]), (strobes, mask["CAPTURE_NEXT"])]
-    for absent, refused in (("capture", queue), ("compare", compare)):
+    check = [(base + DEFINES["FEEDBACK_COUNTS_PER_REVOLUTION"], 4096)]
+    for absent, refused in (("capture", queue), ("compare", compare), ("encoder_check", check)):
         machine = CompiledNode(absent=(absent,))
-        for address, value in (*queue, *compare, *always):
+        for address, value in (*queue, *compare, *check, *always):
             cause, _ = machine.request("write_register", address=address, value=value)
             assert cause == ("not_built" if (address, value) in refused else "ok")
 

@@ -143,6 +143,18 @@ def test_the_deglitcher_counts_samples_at_the_set_distance():
     assert machine.axes[0].word[DEFINES["AXIS_SENSING"]] & 0xFFFF == (40 + 4) // 5
 
 
+def test_a_long_deglitch_time_takes_samples_further_apart():
+    machine = CompiledNode()
+    for deglitch, skip, samples in (
+        (15_750, 0, 63),  # 63 clk of 4 MHz: a sample in each
+        (16_000, 1, 32),
+        (1_000_000, 63, 63),  # the longest one, 4000 clk
+    ):
+        machine.set(deglitch=deglitch)
+        assert machine.feedback_channels[0].word[DEFINES["FEEDBACK_EDGE_FILTER"]] == skip
+        assert machine.axes[0].word[DEFINES["AXIS_SENSING"]] & 0xFFFF == samples
+
+
 # ---- the calibration
 
 

@@ -5,7 +5,7 @@ simple axes in Python.
 The player adds up the segments as they were pushed: without B-spline between their steps or limit
 of jerk. A feed override leaves out ticks, and changes at once. A controlled stop takes
 stop_deceleration off the velocity each tick, and a profile starts at full speed. What
-rtl/control/profile_player.sv does beyond this is tested with its own model, and with the RTL in
+rtl/control/motion_engine.sv does beyond this is tested with its own model, and with the RTL in
 tb/system. Each tick the position moves by half the distance to the target; an axis whose drive is
 off does not move, and it slides a little past a limit switch that has closed. Faults latch as
 drive_interlock does it.
