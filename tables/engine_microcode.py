@@ -992,6 +992,23 @@ STEADY = (*PASSING, "lost", "lost_off", "powerless", "off", "closed", "stepped",
 )
 
 
+def tested_later(lines: list[Line], follow: list[list[int]]) -> list[frozenset[str]]:
+    """For each line, the steady conditions of which a value known before it matters: those that it
+    or a later line tests before they change.
+    """
+    tested: list[frozenset[str]] = [frozenset()] * (len(lines) + 1)
+    settled = False
+    while not settled:
+        settled = True
+        for n in reversed(range(len(lines))):
+            line = lines[n]
+            later = frozenset().union(*(tested[m] for m in follow[n])) - line.changes
+            found = later | ({line.condition} & {*STEADY})
+            if found != tested[n]:
+                tested[n], settled = found, False
+    return tested
+
+
 def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool) -> list[int]:
     """The longest path from a label to the line `end`, both included, as the numbers of its lines.
     A jump back is taken once, to the next filter `filters` times; a repeated line counts as often
@@ -999,6 +1016,7 @@ def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool
     """
     labels = {line.label: n for n, line in enumerate(lines) if line.label}
     follow = successors(lines)
+    tested = tested_later(lines, follow)
     memory: dict[tuple[int, object], tuple[int, ...]] = {}
 
     def repeated(n: int) -> int:
@@ -1039,7 +1057,7 @@ def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool
                 if taken.count(m) >= most:
                     continue
                 now = tuple(sorted((*taken, m)))
-            rest = walk(m, now, frozenset(after.items()))
+            rest = walk(m, now, frozenset(fact for fact in after.items() if fact[0] in tested[m]))
             if rest and len(rest) + repeated(n) > len(best):
                 best = (n,) * repeated(n) + rest
         memory[key] = best
@@ -1095,8 +1113,8 @@ def text() -> str:
         f"        lines[{n}] = 36'h{code:09x};  // {line}".rstrip()
         for n, (line, code) in enumerate(codes())
     ]
-    between = worst(lines, 0)[0]
     bounds = [worst(lines, filters) for filters in range(5)]
+    between = bounds[0][0]
     choice = " : ".join(f"FILTERS == {n} ? {axis}" for n, (_, axis) in enumerate(bounds[:-1]))
     return "\n".join(
         [
