@@ -240,9 +240,7 @@ def test_a_wrong_file_is_one_sentence_and_nothing_is_written(file):
 
 def test_a_node_without_a_table_reports_it_in_one_sentence(file):
     node = BusNode(absent=("segments",))
-    assert "was built without this function" in sentence(
-        Call("segments use linear", node), 1
-    )
+    assert "was built without this function" in sentence(Call("segments use linear", node), 1)
     assert "without a segment table" in sentence(
         Call(["segments", "load", str(file(*GOOD))], node), 2
     )
