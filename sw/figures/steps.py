@@ -127,9 +127,9 @@ FIGURES = {
     "step_hx8k_lc": Figure(
         step_hx8k_lc,
         "LC",
-        "step generator (for comparison: without its registers, and without step_lines, which gives "
-        "the rates of all axes as the PC gives them to HostMot2) with all timings and modes on an "
-        "iCE40 HX8K, placement seed 1",
+        "step generator (for comparison: without its registers, and without step_lines, which "
+        "gives the rates of all axes as the PC gives them to HostMot2) with all timings and modes "
+        "on an iCE40 HX8K, placement seed 1",
         "< 406",
         ELABORATED,
         0,
