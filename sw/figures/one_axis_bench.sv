@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis_bench -- one axis with its motion engine and its register memory, as in node.sv; the top of
+// one_axis_bench -- one axis with its motion engine and its register memory, as in node.sv; the top of
 // sw/figures/interlock_run.cpp.
 `default_nettype none
 
-module axis_bench #(
+module one_axis_bench #(
     parameter int CLK_HZ = 4_000_000  // Hz, clk frequency
 ) (
     input  wire         clk,
