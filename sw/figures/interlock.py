@@ -23,7 +23,7 @@ from moire.errors import BusError, Refused
 from twin import Axis, Node, Twin, TwinTransport, build
 
 DRIVER = Path(__file__).with_name("interlock_run.cpp")
-BENCH = Path(__file__).with_name("axis_bench.sv")
+BENCH = Path(__file__).with_name("one_axis_bench.sv")
 FAULTS = 10**4
 NODE_FAULTS, CORE_FAULTS = 200, 100  # of them: in the whole node; in its soft core
 SHARE = 400  # faults of the axis in one run, with a seed of its own

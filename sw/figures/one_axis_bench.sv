@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis_bench -- one axis with its motion engine and its register memory, as in node.sv; the top of
+// one_axis_bench -- one axis with its motion engine and its register memory, as in node.sv; the top of
 // sw/figures/interlock_run.cpp.
 `default_nettype none
 
-module axis_bench (
+module one_axis_bench (
     input  wire         clk,
     input  wire         rst,
     // register bus
