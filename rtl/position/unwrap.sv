@@ -30,8 +30,9 @@ module unwrap (
     // -1, 0 or 1
     wire signed  [ 1:0] carry = 2'((18'(step) + $signed({2'b00, fraction})) >>> 16);
     // Two adders: as one sum of three numbers they would take twice the cells.
-    (* keep *)wire signed  [31:0] shifted = periods + shift_periods;
+    (* keep *)wire signed  [31:0] shifted;
 
+    assign shifted  = periods + shift_periods;
     assign position = {periods, fraction};
 
     always_ff @(posedge clk) begin

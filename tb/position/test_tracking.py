@@ -50,7 +50,7 @@ class Scale:
             await FallingEdge(dut.clk)
             overspeed |= int(dut.overspeed.value)
         step, expected_overspeed = self.tracker.follow(phase)
-        position = self.unwrap.step(1, step, phase, 0, 0)[1]
+        position = self.unwrap.step(1, step, phase, 0)[1]
         for cycle in range(4):
             disagreement = self.coarse.step(
                 LIMIT, int(cycle == 0), position, int(dut.count.value.to_signed()), 0, 0

@@ -46,11 +46,12 @@ NEEDED_BY = {  # what goes with a feature
 }
 FULL = {parameter_of(name): 1 for name in FEATURES} | {"FILTERS": 2, "SEGMENTS": 255}
 OF_ENGINE = ("waits", "result_valid", "result_kind", "result", "result_flag", "servo_overrun")
+OF_LINES = ("line_start", "line_idle", "rate_valid", "rate", "rate_restart", "rate_steep")
 INPUTS = (
     *OF_ENGINE,
+    *OF_LINES,
     *("select", "feedback_select", "actuator_select", "write", "word", "wdata", "tick"),
     *(
-        "tick_period",
         "sample_tick",
         "limit_tick",
         "now",
