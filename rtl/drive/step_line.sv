@@ -2,13 +2,13 @@
 // step_line -- hold the motor steps of a servo tick until the next one, and report then to the step
 // generator whether to draw a line to them or to restart there.
 //
-// latency   0 cycles from tick to go or restart: the line begins one tick after the tick whose target
-//           it leads to
+// latency   0 cycles from tick to go or restart: the line begins one tick after the tick whose
+//           target it leads to
 // rate      one target per tick
 // behaviour All axes of a node draw their lines at the same time, and each line has the length of a
-//           tick. The generator restarts, without making a step, at the first target after the drive
-//           came on, and at a target that is given with restart_in. target_up and target_down belong
-//           to the line that is being drawn.
+//           tick. The generator restarts, without making a step, at the first target after the
+//           drive came on, and at a target that is given with restart_in. target_up and target_down
+//           belong to the line that is being drawn.
 // model     tb/drive/step_line.py, equal in every bit of every cycle
 // proved    go and restart never come together, and neither before a target was given. After the
 //           drive was off, no go comes before the target of a later tick.
