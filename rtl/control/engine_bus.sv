@@ -2,13 +2,14 @@
 // engine_bus -- pass what is written to the register map to motion_engine, and let the soft core
 // wait while a setting or a request is not done yet.
 //
-// latency   1 cycle from stores to setting_write and gains_changed; push when its setting is written
+// latency   1 cycle from stores to setting_write and gains_changed; push when its setting is
+//           written
 // rate      one word, then the next one when hold and waits are low
 // behaviour A word that is not of the engine, or of an axis or a filter that is not built, is left
-//           out. gains_changed comes before the gain is written, so that no tick uses a gain without
-//           it. waits is high while anything that was requested of the engine is not done and shown:
-//           the registers always show the state after all requests, in their order. Only one shift
-//           of an origin at a time waits, so there is one shift_by for all axes.
+//           out. gains_changed comes before the gain is written, so that no tick uses a gain
+//           without it. waits is high while anything that was requested of the engine is not done
+//           and shown: the registers always show the state after all requests, in their order. Only
+//           one shift of an origin at a time waits, so there is one shift_by for all axes.
 // source    engine_words: which register is which word
 // model     tb/control/engine_bus.py, equal in every bit of every cycle
 // proved    A word of the engine gives one setting, with hold high until it is written, and a

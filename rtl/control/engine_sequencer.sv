@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_sequencer -- fetch the lines of the microcode of motion_engine, decide the jumps, and serve
-// one axis after the other at each tick.
+// engine_sequencer -- fetch the lines of the microcode of motion_engine, decide the jumps, and
+// serve one axis after the other at each tick.
 //
-// latency   1 cycle from tick to busy; a jump costs no cycle. A condition is tested when its line is
-//           fetched, the actions of a line are executed two cycles later.
+// latency   1 cycle from tick to busy; a jump costs no cycle. A condition is tested when its line
+//           is fetched, the actions of a line are executed two cycles later.
 // rate      one line per cycle; a tick when the one before has been served. overrun reports a tick
 //           that comes sooner.
 // model     tb/control/engine_sequencer.py, equal in every bit of every cycle

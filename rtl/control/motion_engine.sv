@@ -2,9 +2,9 @@
 // motion_engine -- compute velocity, profile, servo and motor steps of all axes of a node in one
 // datapath, one axis after the other at each servo tick.
 //
-// latency   `cycles` at most from tick to the last result: 76 and 365 for each axis without filters,
-//           484 with two filters, 592 with four. The results of an axis come before the next step of
-//           its profile is prepared, which is the last third of its time.
+// latency   `cycles` at most from tick to the last result: 76 and 365 for each axis without
+//           filters, 484 with two filters, 592 with four. The results of an axis come before the
+//           next step of its profile is prepared, which is the last third of its time.
 // rate      a tick when the one before has been served, else overrun is reported and what the axes
 //           show is not certain; between two ticks one request of an axis per 20 to 70 cycles
 // accuracy  Profile: exact, in n ticks a segment moves by v n + a n(n-1)/2 + j n(n-1)(n-2)/6 in
@@ -14,29 +14,29 @@
 //           second half of a tick on. Motor steps: floor(position * step_ratio / 2^32) modulo 2^48.
 // method    One adder of 72 bits, one multiplier of 35 bits and one memory, controlled by the
 //           microcode of tables/engine_microcode.py. A line is fetched, its operand is read in the
-//           next cycle and added in the one after. The words of an axis, its queue, its settings and
-//           its filters are in the memory; the flags are loaded with each axis.
+//           next cycle and added in the one after. The words of an axis, its queue, its settings
+//           and its filters are in the memory; the flags are loaded with each axis.
 // behaviour All axes are sampled in the cycle of the tick, and starts that were requested before it
 //           begin at it. A start makes the profile move at once; the first tick only prepares.
 //           Requests are served between two ticks, in the order shift, set_target_to_position,
-//           push, start, arm, controlled_stop; at the tick only shifts, and starts of axes that wait
-//           for nothing else. A shift is done in the cycle in which the position moves: it is seen
-//           with the position, so the error is never disturbed. push takes the segment from the
-//           settings; it is ignored while the queue is full or a stop runs, and a segment of 0 ticks
-//           that is not the last is left out. Without a segment the acceleration stays for one tick,
-//           underrun is reported, and a controlled stop begins. Profile, feed override, servo and
-//           filters are those of the models.
-//           Results: 0 state (the flags from bit 1 on, bit 16 the head of the queue, bit 20 its
-//           length), 1 target in 2^-16 period, 2 its velocity and 3 the measured velocity in 2^-16
-//           period/tick, 4 following error in 2^-16 period (flag: above following_limit), 5 command
-//           (flag: at its limit), 6 target in 2^-16 motor step (flag: restart there), 7 underrun.
-// limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units: gains
-//           2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16 command, integral_limit 2^-24
-//           command, coefficients 2^-32, stop_deceleration 2^-40 period/tick2, trim_scale 2^-16
-//           period/command, segment_ticks bit 24: the last segment. A segment, and shift_by from the
-//           cycle after shift on, stay as they are while `waits` is high.
-// source    forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45;
-//           Ohmae et al., IEEE Trans. IE-29 (1982) 207, count times
+//           push, start, arm, controlled_stop; at the tick only shifts, and starts of axes that
+//           wait for nothing else. A shift is done in the cycle in which the position moves: it is
+//           seen with the position, so the error is never disturbed. push takes the segment from
+//           the settings; it is ignored while the queue is full or a stop runs, and a segment of 0
+//           ticks that is not the last is left out. Without a segment the acceleration stays for
+//           one tick, underrun is reported, and a controlled stop begins. Profile, feed override,
+//           servo and filters are those of the models. Results: 0 state (the flags from bit 1 on,
+//           bit 16 the head of the queue, bit 20 its length), 1 target in 2^-16 period, 2 its
+//           velocity and 3 the measured velocity in 2^-16 period/tick, 4 following error in 2^-16
+//           period (flag: above following_limit), 5 command (flag: at its limit), 6 target in 2^-16
+//           motor step (flag: restart there), 7 underrun.
+// limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units:
+//           gains 2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16 command, integral_limit
+//           2^-24 command, coefficients 2^-32, stop_deceleration 2^-40 period/tick2, trim_scale
+//           2^-16 period/command, segment_ticks bit 24: the last segment. A segment, and shift_by
+//           from the cycle after shift on, stay as they are while `waits` is high.
+// source    forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45; Ohmae et
+//           al., IEEE Trans. IE-29 (1982) 207, count times
 // model     tb/control/motion_engine.py, equal in every result of every tick and request
 `default_nettype none
 

@@ -3,18 +3,18 @@
 // position, and integral += ki e.
 //
 // latency   53 cycles from tick to valid
-// rate      one command per tick, a tick at least 53 cycles after the one before. An earlier tick is
-//           ignored.
-// behaviour The inputs are sampled with tick. Anti-windup: the integral is limited to limit, does not
-//           grow in a direction in which the last command was at its limit, and is zero in open loop
-//           and without power. Bumpless transfer: after the loop was closed, the power came on or kp
-//           changed, the command is held for one tick (at 0 while the power was off), and the
+// rate      one command per tick, a tick at least 53 cycles after the one before. An earlier tick
+//           is ignored.
+// behaviour The inputs are sampled with tick. Anti-windup: the integral is limited to limit, does
+//           not grow in a direction in which the last command was at its limit, and is zero in open
+//           loop and without power. Bumpless transfer: after the loop was closed, the power came on
+//           or kp changed, the command is held for one tick (at 0 while the power was off), and the
 //           integral takes the value from which the next command continues, as far as limit allows;
-//           with ki = 0 the command follows kp at once. A tick whose inputs were taken without power
-//           does not count: the command is held. Opening the loop gives open_command at once.
+//           with ki = 0 the command follows kp at once. A tick whose inputs were taken without
+//           power does not count: the command is held. Opening the loop gives open_command at once.
 // model     tb/drive/pi_loop.py, equal in every bit of every cycle
-// proved    A command of the closed loop is within limit, whatever gains and inputs do. An open-loop
-//           command is passed on unchanged. command changes only with valid.
+// proved    A command of the closed loop is within limit, whatever gains and inputs do. An
+//           open-loop command is passed on unchanged. command changes only with valid.
 // proof     depth 12
 `default_nettype none
 

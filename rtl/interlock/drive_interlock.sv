@@ -5,12 +5,12 @@
 // latency   1 cycle from a cause to faults and to enabled low, and from command_in to command_out;
 //           2 cycles from a following error to enabled low.
 // behaviour Emergency stop, drive fault and CPU trap always latch. Limit switches (unless homing),
-//           encoder fault, bus watchdog, profile underrun, step overrun, servo overrun and following
-//           error latch while enable is requested. The following error counts from the second error_valid after
-//           enabled and closed_loop are both high, so that no error measured before then counts.
-//           reset_faults clears the faults whose cause is gone, and only while enable_request is
-//           low; nothing restarts by itself. A command that was made zero stays zero until the next
-//           command_in.
+//           encoder fault, bus watchdog, profile underrun, step overrun, servo overrun and
+//           following error latch while enable is requested. The following error counts from the
+//           second error_valid after enabled and closed_loop are both high, so that no error
+//           measured before then counts. reset_faults clears the faults whose cause is gone, and
+//           only while enable_request is low; nothing restarts by itself. A command that was made
+//           zero stays zero until the next command_in.
 // model     tb/interlock/drive_interlock.py, equal in every bit of every cycle
 // proved    Whatever the bus writes: enabled is never high with a latched fault, nor one cycle
 //           after a cause or without a request. A fault is cleared only by reset_faults with

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// register_memory -- holds the settings of all register blocks for reading back, and the low word of
-// a setting of 64 bits until its high word is written.
+// register_memory -- holds the settings of all register blocks for reading back, and the low word
+// of a setting of 64 bits until its high word is written.
 //
 // latency   1 cycle from select to rdata and to wdata_low; 2048 cycles without hold from the end of
 //           rst to ready
 // rate      one access every 2 cycles
 // behaviour After rst each setting gets its first value, one word in each cycle without hold; until
 //           ready is high there must be no access. stores shows every setting that is written, its
-//           first value too; of a value of 64 bits with its high word. A write of a low word changes wdata_low only; the write of the
-//           high word stores both. There is one wdata_low for all blocks.
+//           first value too; of a value of 64 bits with its high word. A write of a low word
+//           changes wdata_low only; the write of the high word stores both. There is one wdata_low
+//           for all blocks.
 // source    register_layout: the layout of the memory, the bits of each setting, the first values
 // model     tb/registers/register_memory.py, equal in every bit of every cycle
 // proved    A read of any word gives what the last write of the word stored, else its first value;
 //           no access to another word changes it. The low word of a setting of 64 bits reads what
 //           was written before the last write of its high word.
-// limits    The settings that need what an axis has not read 0: the HAS_... parameters and FILTERS are
-//           masks, bit n for axis n.
+// limits    The settings that need what an axis has not read 0: the HAS_... parameters and FILTERS
+//           are masks, bit n for axis n.
 // proof     depth 4, AXES = 2
 `default_nettype none
 

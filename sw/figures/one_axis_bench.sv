@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// one_axis_bench -- one axis with its motion engine and its register memory, as in node.sv; the top of
-// sw/figures/interlock_run.cpp.
+// one_axis_bench -- one axis with its motion engine and its register memory, as in node.sv; the top
+// of sw/figures/interlock_run.cpp.
 `default_nettype none
 
 module one_axis_bench (
