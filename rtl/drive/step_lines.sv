@@ -4,8 +4,9 @@
 //
 // latency   RATE_F + 4 cycles from a target to its rate, and as many for each axis before it. The
 //           line to a target begins with the first line_start after that.
-// rate      one tick per `period` cycles; a tick that comes sooner waits for the end of the lines.
-//           One target of each axis per line; of two, the later one counts.
+// rate      one tick per `period` cycles; a tick that comes sooner waits for the end of the lines,
+//           unless no axis follows them. One target of each axis per line; of two, the later one
+//           counts.
 // accuracy  A line ends less than period * 2^-RATE_F step above its target, and the next one begins
 //           there, so that no tick loses anything.
 // method    rate = floor((distance * 2^(RATE_F - 16) + rest) / period), where the rest of the
@@ -17,8 +18,8 @@
 // limits    period may change only while no axis moves. AXES * (RATE_F + 4) cycles must be less than
 //           what is left of a tick when the last target comes.
 // model     tb/drive/step_lines.py, equal in every bit of every cycle
-// proved    Lines begin at least `period` cycles apart. A rate that was given is never replaced
-//           before a line has begun with it.
+// proved    Lines begin at least `period` cycles apart, unless no axis follows them. A rate that was
+//           given is never replaced before a line has begun with it.
 // proof     depth 12, AXES = 2, PERIOD_W = 3, RATE_F = 20
 `default_nettype none
 
@@ -57,10 +58,10 @@ module step_lines #(
     localparam int A = AXES > 1 ? $clog2(AXES) : 1;
 
     // the common line
-    logic [P-1:0] left;  // cycles left of the lines, less one
+    logic [P-1:0] left;  // cycles left of the lines, less one; of no effect while no axis follows
     logic         waiting;  // a tick waits for their end
 
-    wire          ended = left == '0;
+    wire          ended = left == '0 || &stopped;
 
     assign line_start = (tick || waiting) && ended && period != '0;
     assign line_idle  = ended && !line_start;
@@ -106,7 +107,7 @@ module step_lines #(
     always_ff @(posedge clk) begin
         waiting <= (tick || waiting) && !line_start;
         if (line_start) left <= period - 1'b1;
-        else if (!ended) left <= left - 1'b1;
+        else if (left != '0) left <= left - 1'b1;
 
         if (valid) targets[of] <= target;
         if (take) ends[n] <= end_n;
@@ -168,7 +169,7 @@ module step_lines #(
         if (past) begin
             assume (period == $past(period) && axis < AXES);
             assert (since >= {1'b0, period} - {1'b0, left});
-            if (line_start) assert (since >= {1'b0, period});
+            if (line_start && !(&stopped)) assert (since >= {1'b0, period});
             assert (held == given);
             assert ((rate_valid & held) == '0);
             assert (n < AXES);

@@ -439,13 +439,13 @@ struct Campaign {
         nonsense(UNDERRUN);
     }
 
-    // More steps than the wire can carry: the generator may be 2^22 / tick_period behind.
+    // More steps than the wire can carry: the generator may be 2^(AHEAD_W - 2) steps behind.
     void overrun() {
         Bench& b = *bench;
         kind_of_drive(1);
         switch_on(0, 0);
         b.run_ticks(2);
-        const int64_t most_behind = (int64_t(1) << 22) / b.period, origin = b.steps,
+        const int64_t most_behind = 256, origin = b.steps,
                       position = b.target;
         const auto behind = [&](int64_t target) {
             return std::abs((((target - position) * ratio) >> 16) - (b.steps - origin));
@@ -498,7 +498,7 @@ struct Campaign {
         b.run_ticks(3);
         const int64_t on = b.on_clk, begin = b.now;
         b.pin(cause, true);
-        b.run(homing ? 2 * b.period : random.from(1, LIMIT_CYCLES - 1));
+        b.run(homing ? 2 * b.period : random.from(1, LIMIT_CYCLES - LIMIT_TICK - 1));
         b.pin(cause, false);
         b.run(LIMIT_CYCLES + 40);
         if (b.on_clk - on != b.now - begin || b.get(AXIS_FAULTS)) fail("fault without a cause");

@@ -38,7 +38,8 @@ class StepLines:
         """(line_start, line_idle, rate_valid, what is given with it); the last is None or (rate,
         restart, steep).
         """
-        ended, served = self.left == 0, self.axes[self.n]
+        ended = self.left == 0 or stopped == (1 << len(self.axes)) - 1
+        served = self.axes[self.n]
         start = bool((tick or self.waiting) and ended and period)
         gives = self.state == "give"
         out = (

@@ -166,6 +166,25 @@ async def a_tick_that_comes_too_soon_waits_and_no_line_is_lost(dut):
 
 
 @cocotb.test()
+async def after_a_tick_that_came_too_soon_lines_begin_with_the_ticks_again_once_no_axis_moves(dut):
+    period = 60
+    lines = await Lines(dut).reset(period=period)
+    for wait in (20, *[period - 1] * 4):  # the first tick comes too soon
+        await lines.clk(tick=1)
+        await lines.wait(wait)
+    assert lines.starts[-1] % period != (lines.cycle - period) % period, "lines are late"
+    await lines.clk(stopped=(1 << lines.axes) - 1)
+    await lines.wait(period // 3)
+    lines.starts.clear()
+    ticks = []
+    for stopped in ((1 << lines.axes) - 1, 0, 0, 0):
+        ticks.append(lines.cycle)
+        await lines.clk(tick=1, stopped=stopped)
+        await lines.wait(period - 1)
+    assert lines.starts == ticks
+
+
+@cocotb.test()
 async def with_a_period_of_0_no_line_begins(dut):
     lines = await Lines(dut).reset(period=0)
     for _ in range(5):
@@ -192,7 +211,7 @@ async def any_targets_match_the_model(dut):
         if random.randrange(inputs.get("period", 90) + 2) == 0:
             inputs["tick"] = 1
         if random.randrange(300) == 0:
-            inputs["stopped"] = random.getrandbits(lines.axes)
+            inputs["stopped"] = random.choice((random.getrandbits(lines.axes), -1)) % 2**lines.axes
         if lines.model.state == "seek" and random.randrange(600) == 0:
             inputs["period"] = random.choice((0, 1, 2, 60, 100, 100, 2**18 - 1))
         await lines.clk(rst=int(random.randrange(3000) == 0), **inputs)

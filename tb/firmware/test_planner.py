@@ -161,13 +161,13 @@ def test_a_plan_taken_in_pieces_is_the_same_motion():
         )
 
 
-QUEUE, SHORT = 16, 3  # segments that the player queues; ticks that become one segment
+QUEUE, SHORT = 16, 2  # segments that the player queues; ticks that become one segment
 
 
 @pytest.mark.parametrize("rates", [S0, (125, *S0[1:]), "any", "trapezoid"])
 def test_ticks_that_are_joined_to_one_segment_are_the_same_motion(rates):
     """Against the plan taken tick by tick. Only the last segment and one whose jerk does not fit
-    into 32 bits, which a trapezoid alone can have, are shorter than three ticks.
+    into 32 bits, which a trapezoid alone can have, are shorter than two ticks.
     """
     draw = random.Random(seed())
     for _ in range(400):
@@ -189,8 +189,8 @@ def test_ticks_that_are_joined_to_one_segment_are_the_same_motion(rates):
 
 
 def test_a_short_motion_is_queued_as_a_whole_before_it_starts():
-    """A motion of less than 12 ms never waits for the soft core; of a longer one, the full queue
-    lasts 12 ms.
+    """A motion of less than 8 ms never waits for the soft core; of a longer one, the full queue
+    lasts 8 ms.
     """
     for length in range(1, 1 << 17, 61):
         ticks = [segment[3] for segment in plan_of(length)[0]]

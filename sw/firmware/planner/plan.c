@@ -99,37 +99,35 @@ bool plan_walk(const struct plan* plan, struct planner_progress* at, uint8_t* ne
     return true;
 }
 
-// The velocity of the next tick.
-static int64_t next_velocity(const struct plan* plan) {
-    int64_t velocity = plan->at.state.velocity;
-    for (uint8_t n = plan->next; n < plan->count && plan->event[n].tick == plan->at.tick; n++)
-        velocity += plan->event[n].velocity;
+// The velocity of the tick that follows a progress.
+static int64_t velocity_at(const struct plan* plan, const struct planner_progress* at,
+                           uint8_t next) {
+    int64_t velocity = at->state.velocity;
+    for (; next < plan->count && plan->event[next].tick == at->tick; next++)
+        velocity += plan->event[next].velocity;
     return velocity;
 }
 
-// Appends a tick of this velocity to a segment of one or two ticks, if the jerk fits into 32 bits.
-static bool append(struct planner_segment* piece, int64_t velocity) {
-    if (piece->ticks == 1) {
-        piece->acceleration = velocity - piece->velocity;
-        piece->jerk = 0;
-    } else {
-        const int64_t jerk = velocity - piece->velocity - 2 * piece->acceleration;
-        if ((int32_t)jerk != jerk) return false;
-        piece->jerk = (int32_t)jerk;
-    }
-    piece->ticks++;
-    return true;
+// Joins the next tick to a segment of one tick, if the jerk fits into 32 bits.
+static void join(struct plan* plan, struct planner_segment* piece, bool* last) {
+    struct planner_progress at = plan->at;
+    uint8_t next = plan->next;
+    struct planner_segment tick;
+    bool ends;
+    plan_walk(plan, &at, &next, &tick, &ends, 1);
+    const int64_t acceleration = tick.velocity - piece->velocity,
+                  after = ends ? tick.acceleration : velocity_at(plan, &at, next) - tick.velocity,
+                  jerk = after - acceleration;
+    if ((int32_t)jerk != jerk) return;
+    *piece = (struct planner_segment){piece->velocity, acceleration, (int32_t)jerk, 2};
+    plan->at = at;
+    plan->next = next;
+    *last = ends;
 }
 
 bool planner_take_up_to(struct plan* plan, struct planner_segment* piece, bool* last,
                         uint32_t longest) {
     if (!plan_walk(plan, &plan->at, &plan->next, piece, last, longest)) return false;
-    if (plan->stepped) return true;
-    if (longest > PLANNER_SHORT_PIECE) longest = PLANNER_SHORT_PIECE;
-    while (piece->ticks < longest && !*last) {
-        struct planner_segment tick;
-        if (!append(piece, next_velocity(plan))) break;
-        plan_walk(plan, &plan->at, &plan->next, &tick, last, 1);
-    }
+    if (!plan->stepped && !*last && piece->ticks == 1 && longest > 1) join(plan, piece, last);
     return true;
 }
