@@ -445,8 +445,7 @@ struct Campaign {
         kind_of_drive(1);
         switch_on(0, 0);
         b.run_ticks(2);
-        const int64_t most_behind = 256, origin = b.steps,
-                      position = b.target;
+        const int64_t most_behind = 256, origin = b.steps, position = b.target;
         const auto behind = [&](int64_t target) {
             return std::abs((((target - position) * ratio) >> 16) - (b.steps - origin));
         };
