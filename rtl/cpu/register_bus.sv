@@ -9,30 +9,30 @@
 //           actuator at 0x1400 + n * 0x100
 // model     tb/cpu/register_bus.py, equal in every bit of every cycle
 // proved    An access reaches at most one block, the one that holds its address, and none without
-//           select. rdata has the bits of all answers of the cycle before.
+//           select. rdata has the bits of all answers to the last access.
 // proof     depth 4, AXES = 2
 `default_nettype none
 
 module register_bus #(
     parameter int AXES = 1  // number of axis blocks on the bus
 ) (
-    input  wire                clk,
-    input  wire                select,              // strobe: an access
-    input  wire  [       15:0] address,             // byte address inside the register map
-    input  wire  [       31:0] memory_rdata,        // settings in the word of the last access
-    input  wire  [       31:0] node_rdata,          // live bits, 1 cycle after node_select
-    input  wire  [       31:0] bus_rdata,           // live bits, 1 cycle after bus_select
-    input  wire  [       31:0] peripherals_rdata,   // live bits, 1 cycle after peripherals_select
-    input  wire  [32*AXES-1:0] axis_rdata,          // live bits, axis n: bits 32 n + 31 .. 32 n
-    input  wire  [32*AXES-1:0] feedback_rdata,      // live bits, axis n: bits 32 n + 31 .. 32 n
-    input  wire  [32*AXES-1:0] actuator_rdata,      // live bits, axis n: bits 32 n + 31 .. 32 n
-    output logic               node_select,         // strobe: access to the node's block
-    output logic               bus_select,          // strobe: access to the RS-485 bus block
-    output logic               peripherals_select,  // strobe: access to the peripherals' block
-    output logic [   AXES-1:0] axis_select,         // strobe: access to axis n
-    output logic [   AXES-1:0] feedback_select,     // strobe: access to feedback channel n
-    output logic [   AXES-1:0] actuator_select,     // strobe: access to actuator n
-    output logic [       31:0] rdata                // word of the access 2 cycles before
+    input wire clk,
+    input wire select,  // strobe: an access
+    input wire [15:0] address,  // byte address inside the register map
+    input wire [31:0] memory_rdata,  // settings in the word of the last access
+    input wire [31:0] node_rdata,  // live bits, 1 cycle after node_select
+    input wire [31:0] bus_rdata,  // live bits, 1 cycle after bus_select
+    input wire [31:0] peripherals_rdata,  // live bits, 1 cycle after peripherals_select
+    input wire [32*AXES-1:0] axis_rdata,  // live bits, axis n: bits 32 n + 31 .. 32 n
+    input wire [32*AXES-1:0] feedback_rdata,  // live bits, axis n: bits 32 n + 31 .. 32 n
+    input wire [32*AXES-1:0] actuator_rdata,  // live bits, axis n: bits 32 n + 31 .. 32 n
+    output logic node_select,  // strobe: access to the node's block
+    output logic bus_select,  // strobe: access to the RS-485 bus block
+    output logic peripherals_select,  // strobe: access to the peripherals' block
+    output logic [AXES-1:0] axis_select,  // strobe: access to axis n
+    output logic [AXES-1:0] feedback_select,  // strobe: access to feedback channel n
+    output logic [AXES-1:0] actuator_select,  // strobe: access to actuator n
+    output logic [31:0] rdata  // word of the last access, from 2 cycles after it on
 );
     if (AXES < 1 || AXES > 8) begin : g_check
         AXES_MUST_BE_FROM_1_TO_8 u_error ();
@@ -62,7 +62,12 @@ module register_bus #(
         end
     end
 
-    always_ff @(posedge clk) rdata <= answer;
+    logic accessed;  // the blocks answer in this cycle
+
+    always_ff @(posedge clk) begin
+        accessed <= select;
+        if (accessed) rdata <= answer;
+    end
 
     wire unused = &{1'b0, address[7:0]};
 
@@ -85,8 +90,10 @@ module register_bus #(
         assert ((chosen & (chosen - 1'b1)) == '0);
         assert (select || chosen == '0);
         assert (node_select == (select && block == 0) && bus_select == (select && block == 1));
-        if (past) assert (rdata == $past(together));
-        cover (past && chosen[BLOCKS-1] && $past(chosen[0]) && rdata == 3);
+        if (past && $past(accessed)) assert (rdata == $past(together));
+        if (past && !$past(accessed)) assert (rdata == $past(rdata));
+        if (past) assert (accessed == $past(select));
+        cover (past && chosen[BLOCKS-1] && $past(chosen[0], 2) && rdata == 3);
     end
 `endif
 endmodule

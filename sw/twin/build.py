@@ -23,6 +23,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from firmware import build as firmware_build
+from twin import rising_edge
 from twin.parameters import tables as parameters
 
 HERE = Path(__file__).resolve().parent
@@ -347,6 +348,7 @@ def verilate_node(
         ROOT / "rtl" / "node.sv",
         "Vnode",
         values,
+        "--no-decoration",
         ROOT / "rtl" / "cpu" / "picorv32.vlt",
     )
     code = (folder / "Vnode___024root.h").read_text()
@@ -360,19 +362,18 @@ def verilate_node(
             "the memory of the soft core was not found in Verilator's output: "
             "has node_memory been renamed?"
         )
-    once = "__Vtrigprevexpr___TOP__clk__0"
-    alone = (
-        once in code
-        and code.count("__Vtrigprevexpr") == 1
-        and "Vnode___024root___eval(" in (folder / "Vnode.cpp").read_text()
-    )
-    rearm = f"#define REARM_CLK(pins) (pins).{once} = 0\n" if alone else ""
+    try:
+        evaluation = rising_edge.function(rising_edge.Design.read(folder))
+    except rising_edge.FormError as error:
+        raise BuildError(
+            f"Verilator's code is not as sw/twin/rising_edge.py expects: {error}"
+        ) from error
     includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
     (folder / "verilated_node.h").write_text(
         "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
-        f"#define NODE_MEMORY {words[0]}\n{rearm}"
+        f"#define NODE_MEMORY {words[0]}\n{evaluation}"
     )
 
 

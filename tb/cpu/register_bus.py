@@ -4,7 +4,7 @@
 
 class RegisterBus:
     def __init__(self, axes=1):
-        self.axes, self.rdata = axes, 0
+        self.axes, self.rdata, self.accessed = axes, 0, 0
 
     def selects(self, select, address):
         """Return the selects of node, bus and peripherals, then of axes, feedback channels and
@@ -17,10 +17,12 @@ class RegisterBus:
 
         return int(block == 0), int(block == 1), int(block == 2), one_of(4), one_of(12), one_of(20)
 
-    def step(self, memory, node, bus, peripherals, *several):
-        """Advance one cycle with these answers: of the register memory, of the blocks of the node,
-        and of the three blocks of each axis.
+    def step(self, select, memory, node, bus, peripherals, *several):
+        """Advance one cycle with an access and the answers to the one before: of the register
+        memory, of the blocks of the node, and of the three blocks of each axis.
         """
-        self.rdata = memory | node | bus | peripherals
-        for word in (word for words in several for word in words):
-            self.rdata |= word
+        if self.accessed:
+            self.rdata = memory | node | bus | peripherals
+            for word in (word for words in several for word in words):
+                self.rdata |= word
+        self.accessed = select

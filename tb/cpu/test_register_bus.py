@@ -34,7 +34,7 @@ async def check(dut, model, select, address, answering=True):
     await FallingEdge(dut.clk)
     got = tuple(int(getattr(dut, f"{block}_select").value) for block in (*ALONE, *OF_AXES))
     assert got == model.selects(select, address), f"address {address:#x}: selects {got}"
-    model.step(memory, *alone, *several)
+    model.step(select, memory, *alone, *several)
     assert int(dut.rdata.value) == model.rdata
     return memory
 
@@ -43,7 +43,10 @@ async def begin(dut):
     Clock(dut.clk, 10, "ns").start()
     for name in ("select", "address", *(f"{b}_rdata" for b in ("memory", *ALONE, *OF_AXES))):
         getattr(dut, name).value = 0
+    dut.select.value = 1
     await FallingEdge(dut.clk)
+    await FallingEdge(dut.clk)
+    dut.select.value = 0
     await FallingEdge(dut.clk)
     return RegisterBus(int(dut.AXES.value))
 
@@ -77,12 +80,17 @@ async def latency_is_0_from_an_access_to_select(dut):
 @cocotb.test()
 async def latency_is_1_from_the_answers_to_rdata(dut):
     await begin(dut)
+    dut.select.value = 1
+    await FallingEdge(dut.clk)
     dut.node_rdata.value, dut.memory_rdata.value = 0x11, 0x2200
     await FallingEdge(dut.clk)
     assert int(dut.rdata.value) == 0x2211
-    dut.node_rdata.value = 0
+    dut.node_rdata.value, dut.select.value = 0, 0
     await Timer(1, "ns")
     assert int(dut.rdata.value) == 0x2211
+    await FallingEdge(dut.clk)
+    assert int(dut.rdata.value) == 0x2200
+    dut.memory_rdata.value = 0
     await FallingEdge(dut.clk)
     assert int(dut.rdata.value) == 0x2200
 
@@ -96,6 +104,7 @@ async def no_block_is_selected_at_other_addresses(dut):
         *(first + 0x100 * model.axes for first in OF_AXES.values()),
         0xFFFC,
     ):
+        await check(dut, model, 1, address)
         memory = await check(dut, model, 1, address, answering=False)
         assert not any(model.selects(1, address)) and int(dut.rdata.value) == memory
     assert not any(model.selects(0, 0))

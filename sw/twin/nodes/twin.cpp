@@ -14,7 +14,7 @@
 #include "machines/machine.h"
 #include "nodes/node_pins.h"
 #include "nodes/peer_line.h"
-#include "verilated_node.h"  // made by build.py: the Verilated sources, CLK_HZ, AXES, REARM_CLK
+#include "verilated_node.h"  // made by build.py: the Verilated sources, CLK_HZ, AXES, rising_edge
 
 namespace twin {
 
@@ -44,17 +44,7 @@ class Core {  // a Verilated node and its clock
         pins.rst = 0;
     }
     ~Core() { model_->final(); }
-    void clk() {
-        pins.clk = 1;
-#ifdef REARM_CLK
-        REARM_CLK(pins);  // as if the falling edge had been evaluated: nothing depends on it,
-        Vnode___024root___eval(&pins);  // and nothing prints or finishes, which eval() looks after
-#else
-        model_->eval();
-        pins.clk = 0;
-        model_->eval();
-#endif
-    }
+    void clk() { rising_edge(pins); }
 
  private:
     std::unique_ptr<VerilatedContext> context_;

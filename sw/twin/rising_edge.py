@@ -1,0 +1,424 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the C++ function that evaluates a Verilated design at a rising edge, from Verilator's own.
+
+Verilator evaluates first the flip-flops, then all logic between them, and keeps every signal in
+memory until the next edge. Here the logic comes first, with the inputs of this cycle, and then the
+flip-flops. Most signals are so needed within one call only: they become local variables, and what
+only one branch of a condition needs is computed in this branch. The registers, memories and outputs
+after each edge are the same, bit for bit; tb/twin/test_rising_edge.py compares them.
+
+Everything here works on the text that `verilator --no-decoration` makes: one statement a line,
+braces at the ends of lines.
+"""
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+ROOT = "Vnode___024root"  # Verilator's class of all signals of the node
+VALUE = r"(?:CData|SData|IData|QData|VlWide<\d+>)(?:/\*[\d:]+\*/)?"
+DECLARATION = re.compile(rf"({VALUE}) (\w+);")
+ASSIGNMENT = re.compile(r"(?:vlSelfRef\.)?([A-Za-z_]\w*)((?:\[.*?\])*?) = (.*);")
+ZERO = re.compile(r"VL_ZERO_W\(\d+, (?:vlSelfRef\.)?(\w+)\);")
+NAME = re.compile(
+    r"\b(?!(?:vlSelfRef|[CSIQ]Data|if|else|for|while|do)\b|VL_)([A-Za-z_]\w*)",
+)
+PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
+
+Names = frozenset[str]
+NONE: Names = frozenset()
+
+
+class FormError(Exception):
+    """Verilator's code has another form than this module expects."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a statement does to signals. `needs`: it uses the value from before; `sets`: it assigns
+    them in any case; `changes`: it may assign them.
+    """
+
+    needs: Names = NONE
+    sets: Names = NONE
+    changes: Names = NONE
+
+
+def effect_of(statements: Iterable["Statement"]) -> Effect:
+    """The effect of statements, one after the other."""
+    needs: set[str] = set()
+    sets: set[str] = set()
+    changes: set[str] = set()
+    for statement in statements:
+        needs |= statement.effect.needs - sets
+        sets |= statement.effect.sets
+        changes |= statement.effect.changes
+    return Effect(frozenset(needs), frozenset(sets), frozenset(changes))
+
+
+@dataclass(frozen=True, eq=False)
+class Plain:
+    """Statements of which nothing is known but their effect."""
+
+    text: tuple[str, ...]
+    effect: Effect
+
+    def lines(self) -> Iterator[str]:
+        """The text of it."""
+        yield from self.text
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Statements that stay together."""
+
+    statements: tuple["Statement", ...]
+
+    @cached_property
+    def effect(self) -> Effect:
+        """Of all."""
+        return effect_of(self.statements)
+
+    def lines(self) -> Iterator[str]:
+        """The text of it."""
+        for statement in self.statements:
+            yield from statement.lines()
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """if (condition) {yes} else {no}"""
+
+    condition: str
+    asks: Names
+    yes: tuple["Statement", ...]
+    no: tuple["Statement", ...]
+
+    @cached_property
+    def branches(self) -> tuple[Effect, Effect]:
+        """The effects of both."""
+        return effect_of(self.yes), effect_of(self.no)
+
+    @cached_property
+    def effect(self) -> Effect:
+        """What only one branch assigns keeps its value in the other."""
+        yes, no = self.branches
+        sets, changes = yes.sets & no.sets, yes.changes | no.changes
+        return Effect(self.asks | yes.needs | no.needs | (changes - sets), sets, changes)
+
+    def lines(self) -> Iterator[str]:
+        """The text of it."""
+        yield f"if ({self.condition}) {{"
+        for statement in self.yes:
+            yield from statement.lines()
+        if self.no:
+            yield "} else {"
+            for statement in self.no:
+                yield from statement.lines()
+        yield "}"
+
+
+Statement = Plain | Group | Choice
+
+
+@dataclass
+class Parser:
+    """Statements of lines. words: {array of words that are only used one by one: how many}, whose
+    words are signals of their own, named as `signal[0]`.
+    """
+
+    lines: Sequence[str]
+    words: Mapping[str, int]
+    at: int = 0
+
+    def names(self, text: str) -> Names:
+        """The signals in an expression."""
+        found = set()
+        for match in NAME.finditer(text):
+            name = match.group(1)
+            count = self.words.get(name)
+            if count is None:
+                found.add(name)
+            elif index := re.match(r"\[(\d+)U\]", text[match.end() :]):
+                found.add(f"{name}[{index.group(1)}]")
+            else:
+                found |= {f"{name}[{n}]" for n in range(count)}
+        return frozenset(found)
+
+    def block(self) -> tuple[Statement, ...]:
+        """The statements to the end, or to the brace that closes the block."""
+        found = []
+        while self.at < len(self.lines) and not self.lines[self.at].startswith("}"):
+            found.append(self.statement())
+        return tuple(found)
+
+    def statement(self) -> Statement:
+        """The next one."""
+        line = self.lines[self.at]
+        if line.startswith("if (") and line.endswith(") {"):
+            return self.choice(line[4:-3])
+        if line.endswith("{"):
+            return self.unknown()
+        self.at += 1
+        if match := ZERO.fullmatch(line):
+            return Plain((line,), Effect(NONE, *[self.names(match.group(1))] * 2))
+        match = ASSIGNMENT.fullmatch(line)
+        if not match:
+            names = self.names(line)
+            return Plain((line,), Effect(names, NONE, names))
+        name, index, value = match.groups()
+        needs = self.names(value)
+        if not index or (name in self.words and re.fullmatch(r"\[\d+U\]", index)):
+            target = self.names(name + index)
+            return Plain((line,), Effect(needs, target, target))
+        target = self.names(name)
+        return Plain((line,), Effect(needs | self.names(index) | target, NONE, target))
+
+    def choice(self, condition: str) -> Choice:
+        """An if, whose line is the next."""
+        self.at += 1
+        yes = self.block()
+        no: tuple[Statement, ...] = ()
+        line = self.end()
+        if line.startswith("} else if (") and line.endswith(") {"):
+            return Choice(condition, self.names(condition), yes, (self.choice(line[11:-3]),))
+        self.at += 1
+        if line == "} else {":
+            no = self.block()
+            line = self.end()
+            self.at += 1
+        if line != "}":
+            raise FormError(f"a block ends with {line!r}")
+        return Choice(condition, self.names(condition), yes, no)
+
+    def end(self) -> str:
+        """The line that ends a block."""
+        if self.at == len(self.lines):
+            raise FormError("a block does not end")
+        return self.lines[self.at]
+
+    def unknown(self) -> Plain:
+        """A loop or the like: it may read and change whatever it names."""
+        begin, depth = self.at, 0
+        while self.at == begin or depth:
+            depth += self.lines[self.at].count("{") - self.lines[self.at].count("}")
+            self.at += 1
+        text = tuple(self.lines[begin : self.at])
+        names = self.names("\n".join(text))
+        return Plain(text, Effect(names, NONE, names))
+
+
+@dataclass
+class Design:
+    """Verilator's code of a node, taken apart."""
+
+    types: dict[str, str]  # of the signals that are kept between edges, but of arrays
+    arrays: set[str]  # that are kept between edges
+    inputs: dict[str, int]  # {name: bits}
+    outputs: set[str]
+    locals: dict[str, str]  # types of the variables of the functions
+    logic: Names  # signals that depend on others of the same cycle only
+    program: tuple[Statement, ...]  # what is evaluated at a rising edge
+
+    @classmethod
+    def read(cls, folder: Path) -> "Design":
+        """From the folder of Verilator's code."""
+        code = "\n".join(file.read_text() for file in sorted(folder.glob(f"{ROOT}__*.cpp")))
+        header = (folder / f"{ROOT}.h").read_text()
+        edge = [line for name in called(code, "eval_nba") for line in body(code, name)]
+        settle = [line for name in called(code, "eval_stl") for line in body(code, name)]
+        types = {m[2]: m[1] for line in header.splitlines() if (m := DECLARATION.fullmatch(line))}
+        own = {m[2]: m[1] for line in edge if (m := DECLARATION.fullmatch(line))}
+        lines = [line for line in edge if not DECLARATION.fullmatch(line)]
+        settles = [line for line in settle if not DECLARATION.fullmatch(line)]
+        used = "\n".join(line for line in lines if not ZERO.fullmatch(line))
+        words = {
+            name: int(kind[7 : kind.index(">")])
+            for name, kind in {**types, **own}.items()
+            if kind.startswith("VlWide") and not re.search(rf"\b{name}\b(?!\[\d+U\])", used)
+        }
+        return cls(
+            types,
+            set(re.findall(r"^VlUnpacked<.*> (\w+);$", header, re.M)),
+            {m[1]: int(m[2]) + 1 for m in re.finditer(r"VL_IN\w*\(&?(\w+),(\d+),0", header)},
+            set(re.findall(r"VL_OUT\w*\(&?(\w+),", header)),
+            own,
+            effect_of(Parser(settles, words).block()).changes,
+            Parser(lines, words).block(),
+        )
+
+
+def body(code: str, name: str) -> list[str]:
+    """The lines of a function of the class."""
+    pattern = rf"^(?:VL_ATTR_COLD )?void {ROOT}___{name}\({ROOT}\* vlSelf\) {{\n(.*?)^}}\n(?=\n|\Z)"
+    match = re.search(pattern, code, re.M | re.S)
+    if not match:
+        raise FormError(f"there is no function {name}")
+    return [line for line in match[1].splitlines() if line and not line.startswith(PROLOGUE)]
+
+
+def called(code: str, name: str) -> list[str]:
+    """The functions that a function calls."""
+    found = re.findall(rf"{ROOT}___(\w+)\(vlSelf\);", "\n".join(body(code, name)))
+    if not found:
+        raise FormError(f"{name} calls nothing")
+    return found
+
+
+def array(name: str) -> str:
+    """The name of a signal without the number of a word."""
+    return name.partition("[")[0]
+
+
+def logic_first(design: Design) -> list[Statement]:
+    """The program of an edge with its logic at the beginning instead of the end, where it sees the
+    inputs of the new cycle. A statement goes there if no statement that stays behind it has to do
+    with what it computes or changes what it uses. Statements of flip-flops never go.
+    """
+    stays: set[int] = set()
+    while True:
+        needs: set[str] = set(design.outputs)
+        changes: set[str] = set()
+        moved: list[int] = []
+        for n, statement in reversed(list(enumerate(design.program))):
+            effect = statement.effect
+            free = all(v in design.logic or array(v) in design.locals for v in effect.changes)
+            waits = effect.changes & (needs | changes) or effect.needs & changes
+            if free and n not in stays and not waits:
+                moved.insert(0, n)
+            else:
+                needs |= effect.needs
+                changes |= effect.changes
+        # executed once more before the first edge, it must compute the same again
+        whole = effect_of(design.program[n] for n in moved)
+        again = whole.needs & whole.changes
+        if not again:
+            first = set(moved)
+            rest = [s for n, s in enumerate(design.program) if n not in first]
+            return [design.program[n] for n in moved] + rest
+        known: Names = NONE
+        for n in moved:
+            if (design.program[n].effect.needs - known) & again:
+                stays.add(n)
+            else:
+                known |= design.program[n].effect.sets
+
+
+@dataclass
+class Sinker:
+    """Moves statements to where their results are needed. passing: the names of all signals that
+    only the statements of this list use.
+    """
+
+    passing: Names
+    block: list[Statement | None] = field(default_factory=list)
+    users: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
+    writers: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
+
+    def sunk(self, statements: Iterable[Statement]) -> tuple[Statement, ...]:
+        """The statements in their new places."""
+        self.block = list(statements)
+        for n in reversed(range(len(self.block))):
+            self.place(n)
+        return tuple(s for s in self.block if s)
+
+    def note(self, n: int) -> None:
+        """Enter what a statement uses and changes."""
+        statement = self.block[n]
+        if statement:
+            for name in statement.effect.needs:
+                self.users[name].add(n)
+            for name in statement.effect.changes:
+                self.writers[name].add(n)
+
+    def forget(self, n: int) -> None:
+        """Undo note()."""
+        statement = self.block[n]
+        if statement:
+            for name in statement.effect.needs:
+                self.users[name].discard(n)
+            for name in statement.effect.changes:
+                self.writers[name].discard(n)
+
+    def place(self, n: int) -> None:
+        """Move one statement; those behind it are in their places."""
+        statement = self.block[n]
+        assert statement
+        effect = statement.effect
+        users = {u for name in effect.changes for u in self.users[name]}
+        writers = {w for name in effect.changes for w in self.writers[name]}
+        if not all(array(name) in self.passing for name in effect.changes):
+            self.note(n)
+            return
+        first = min(users | writers, default=n)
+        if not users or (first not in users and len(effect.changes) == 1):
+            self.block[n] = None  # it is not used, or computed anew before any use
+            return
+        others = [self.block[u] for u in users]
+        if writers and users | writers != {first}:
+            self.join(n, first)
+        elif not self.between(effect.needs, n, max(users)) and all(
+            isinstance(other, Choice) and not other.asks & effect.changes for other in others
+        ):
+            for u in users:
+                self.sink(statement, u)
+            self.block[n] = None
+        else:
+            self.note(n)
+
+    def join(self, n: int, m: int) -> None:
+        """Make one group of a value and its exception, which is m, and move that."""
+        value, exception = self.block[n], self.block[m]
+        assert value and exception
+        changes = exception.effect.changes
+        if (
+            value.effect.changes & exception.effect.needs & changes
+            and all(array(name) in self.passing for name in changes)
+            and not self.between(value.effect.needs, n, m)
+        ):
+            self.forget(m)
+            self.block[m], self.block[n] = Group((value, exception)), None
+            self.place(m)
+        else:
+            self.note(n)
+
+    def sink(self, statement: Statement, n: int) -> None:
+        """Put a statement into those branches of a choice that need it."""
+        self.forget(n)
+        choice, changes = self.block[n], statement.effect.changes
+        assert isinstance(choice, Choice)
+        results = frozenset(array(name) for name in changes)
+        yes, no = (
+            Sinker(results).sunk((statement, *branch)) if effect.needs & changes else branch
+            for branch, effect in zip((choice.yes, choice.no), choice.branches)
+        )
+        self.block[n] = Choice(choice.condition, choice.asks, yes, no)
+        self.note(n)
+
+    def between(self, names: Names, begin: int, end: int) -> bool:
+        """Whether a statement between two changes one of these signals."""
+        return any(begin < w < end for name in names for w in self.writers[name])
+
+
+def function(design: Design) -> str:
+    """The C++ of `rising_edge`, which evaluates a design whose inputs are set."""
+    program = logic_first(design)
+    whole = effect_of(program)
+    kept = {array(name) for name in whole.needs} | design.outputs
+    passing = {array(name) for name in whole.changes} - kept
+    here = {**design.locals, **{name: design.types[name] for name in passing & set(design.types)}}
+    statements = Sinker(frozenset(here) & passing).sunk(program)
+    text = "\n".join(line for statement in statements for line in statement.lines())
+    text = re.sub(r"\bvlSelfRef\.(\w+)", lambda m: m[1] if m[1] in here else m[0], text)
+    used = set(NAME.findall(text))
+    variables = "".join(f"{kind} {name};\n" for name, kind in here.items() if name in used)
+    return f"static void rising_edge({ROOT}& vlSelfRef) {{\n{variables}{text}\n}}\n"
+
+
+def registers(design: Design) -> list[str]:
+    """The signals and arrays that an edge leaves to the next one, and the outputs."""
+    needs = {array(name) for name in effect_of(logic_first(design)).needs}
+    return sorted(needs & (set(design.types) | design.arrays) | design.outputs)

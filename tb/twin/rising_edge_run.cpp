@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// rising_edge_run -- two nodes with the same pins and firmware, one evaluated by Verilator, one by
+// rising_edge(); stops at the first cycle after which a register, a memory or an output differs.
+//
+//   rising_edge_run FIRMWARE CYCLES SEED      FIRMWARE: words in hex, one a line
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <string>
+
+#include "verilated_node.h"  // made by twin/build.py
+#include "signals.h"         // made by test_rising_edge.py: INPUTS(X), REGISTERS(X), MEMORIES(X)
+
+constexpr unsigned QUIET = 64;          // an input keeps its level for so many cycles on average
+constexpr uint64_t RESET_CYCLES = 16;   // at the beginning
+constexpr uint64_t MEMORY_CYCLES = 97;  // from one look at the memories to the next
+
+int main(int count, char** arguments) {
+    if (count != 4) return 2;
+    std::ifstream firmware(arguments[1]);
+    const uint64_t cycles = std::strtoull(arguments[2], nullptr, 0);
+    std::mt19937_64 random(std::strtoull(arguments[3], nullptr, 0));
+    VerilatedContext context;
+    Vnode theirs(&context), ours(&context);
+    auto &a = *theirs.rootp, &b = *ours.rootp;
+    a.rst = b.rst = 1;
+    theirs.eval();
+    ours.eval();
+    std::string word;
+    for (int n = 0; firmware >> word; n++)
+        a.NODE_MEMORY[n] = b.NODE_MEMORY[n] = uint32_t(std::stoul(word, nullptr, 16));
+    uint64_t driving = 0;
+    for (uint64_t n = 0; n < cycles; n++) {
+#define SET(name, mask) \
+    if (random() % QUIET == 0) a.name = b.name = uint64_t(random()) & mask;
+        INPUTS(SET)
+        a.rst = b.rst = n < RESET_CYCLES;
+        a.clk = 1;
+        theirs.eval();
+        a.clk = 0;
+        theirs.eval();
+        rising_edge(b);
+#define COMPARE(name)                                                          \
+    if (std::memcmp(&a.name, &b.name, sizeof a.name)) {                        \
+        std::printf("cycle %llu: " #name " differs\n", (unsigned long long)n); \
+        return 1;                                                              \
+    }
+        REGISTERS(COMPARE)
+        if (n % MEMORY_CYCLES == 0 || n + 1 == cycles) {
+            MEMORIES(COMPARE)
+        }
+        driving += a.rs485_driver_enable;
+    }
+    std::printf("the same for %llu cycles; the node drove the bus in %llu of them\n",
+                (unsigned long long)cycles, (unsigned long long)driving);
+}

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The function that evaluates a node at a rising edge: its rules one by one, and the whole against
+Verilator's own evaluation.
+"""
+
+import os
+import random
+from pathlib import Path
+
+import pytest
+
+from experiments import s2_stage
+from twin import build, rising_edge
+from twin.nodes.twin import NODE
+
+CYCLES = 60_000  # the firmware starts, and polls its axis
+
+
+def parsed(*lines, **words):
+    return rising_edge.Parser(lines, words).block()
+
+
+def text_of(statements):
+    return [line for statement in statements for line in statement.lines()]
+
+
+def sunk(*lines, passing="xyz"):
+    return text_of(rising_edge.Sinker(frozenset(passing)).sunk(parsed(*lines)))
+
+
+def test_what_only_one_branch_assigns_is_needed_from_before():
+    (statement,) = parsed("if (a) {", "x = b;", "} else {", "y = c;", "}")
+    assert statement.effect.needs == frozenset("abcxy") and not statement.effect.sets
+    assert statement.effect.changes == frozenset("xy")
+
+
+def test_what_both_branches_assign_is_set():
+    (statement,) = parsed(
+        "if (a) {", "x = b;", "} else if (c) {", "x = 0U;", "} else {", "x = d;", "}"
+    )
+    assert statement.effect.needs == frozenset("abcd") and statement.effect.sets == {"x"}
+
+
+def test_a_part_of_a_signal_keeps_the_rest():
+    (statement,) = parsed("x[a] = b;")
+    assert statement.effect.needs == frozenset("abx") and not statement.effect.sets
+
+
+def test_words_that_are_used_one_by_one_are_signals_of_their_own():
+    first, second = parsed("x[1U] = a;", "b = x[1U];", x=3)
+    assert first.effect.sets == {"x[1]"} and second.effect.needs == {"x[1]"}
+
+
+def test_a_loop_may_read_and_change_whatever_it_names():
+    (statement,) = parsed("while ((a < b)) {", "x = a;", "}")
+    assert statement.effect.needs == statement.effect.changes == frozenset("abx")
+
+
+def test_a_block_that_does_not_end_is_refused():
+    with pytest.raises(rising_edge.FormError, match="does not end"):
+        parsed("if (a) {", "x = b;")
+
+
+def test_what_one_branch_needs_is_computed_in_it():
+    assert sunk("x = a;", "if (b) {", "c = x;", "}") == ["if (b) {", "x = a;", "c = x;", "}"]
+
+
+def test_what_several_branches_need_is_computed_in_each():
+    assert sunk("x = a;", "if (b) {", "c = x;", "}", "if (d) {", "e = x;", "}") == [
+        *("if (b) {", "x = a;", "c = x;", "}"),
+        *("if (d) {", "x = a;", "e = x;", "}"),
+    ]
+
+
+def test_what_a_condition_needs_stays():
+    lines = ["x = a;", "if (x) {", "c = x;", "}"]
+    assert sunk(*lines) == lines
+
+
+def test_nothing_goes_past_a_change_of_what_it_uses():
+    lines = ["x = a;", "a = b;", "if (b) {", "c = x;", "}"]
+    assert sunk(*lines) == lines
+
+
+def test_a_signal_that_lasts_stays():
+    lines = ["f = a;", "if (b) {", "c = f;", "}"]
+    assert sunk(*lines) == lines
+
+
+def test_a_value_and_its_exception_go_together():
+    lines = ["x = a;", "if (b) {", "x = d;", "}", "if (c) {", "e = x;", "}"]
+    assert sunk(*lines) == ["if (c) {", "x = a;", "if (b) {", "x = d;", "}", "e = x;", "}"]
+
+
+def test_what_nobody_uses_is_left_out():
+    assert sunk("x = a;", "x = b;", "c = x;") == ["x = b;", "c = x;"]
+
+
+def test_the_other_statements_of_a_branch_stay():
+    """They may be needed behind it."""
+    lines = ["if (b) {", "y = d;", "c = x;", "}", "e = y;"]
+    assert sunk("x = a;", *lines) == ["if (b) {", "x = a;", "y = d;", "c = x;", "}", "e = y;"]
+
+
+def design(logic, *lines):
+    return rising_edge.Design({}, set(), {}, {"f"}, {}, frozenset(logic), parsed(*lines))
+
+
+def test_logic_goes_first_and_flip_flops_do_not():
+    program = design("x", "a = b;", "b = x;", "x = a;")
+    assert text_of(rising_edge.logic_first(program)) == ["x = a;", "a = b;", "b = x;"]
+
+
+def test_logic_of_an_output_stays_behind_its_flip_flop():
+    program = design("f", "a = b;", "f = a;")
+    assert text_of(rising_edge.logic_first(program)) == ["a = b;", "f = a;"]
+
+
+def test_code_without_the_function_is_refused(tmp_path):
+    (tmp_path / f"{rising_edge.ROOT}__0.cpp").write_text("void nothing() {\n}\n")
+    (tmp_path / f"{rising_edge.ROOT}.h").write_text("")
+    with pytest.raises(rising_edge.FormError, match="there is no function eval_nba"):
+        rising_edge.Design.read(tmp_path)
+
+
+def signals(folder: Path) -> str:
+    """The lists of signals of rising_edge_run.cpp."""
+    read = rising_edge.Design.read(folder)
+    inputs = {name: bits for name, bits in read.inputs.items() if name not in ("clk", "rst")}
+    kept = rising_edge.registers(read)
+    lists = {
+        "INPUTS": [f"X({name}, {hex(2**bits - 1)})" for name, bits in inputs.items()],
+        "REGISTERS": [f"X({name})" for name in kept if name not in read.arrays],
+        "MEMORIES": [f"X({name})" for name in kept if name in read.arrays],
+    }
+    return "".join(f"#define {name}(X) {' '.join(items)}\n" for name, items in lists.items())
+
+
+@pytest.mark.parametrize("node, axes", [(NODE, 1), (s2_stage.NODE, 2)])
+def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes):
+    tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
+    clk_hz = 2_400_000 * axes
+    build.verilate_node(tmp_path, verilator, clk_hz, axes, node)
+    (tmp_path / "signals.h").write_text(signals(tmp_path))
+    (tmp_path / "firmware").write_text("\n".join(f"{w:x}" for w in build.firmware(axes=axes)))
+    flags = [*build.VERILATED, "-std=c++17", "-O1", "-fno-strict-aliasing", "-w", "-pthread"]
+    include = [f"-I{tmp_path}", f"-I{verilator / 'include'}"]
+    driver = Path(__file__).with_name("rising_edge_run.cpp")
+    program = tmp_path / "run"
+    command = [tool, *flags, *include, driver, build.runtime(tool, verilator), "-o", program]
+    build.run(command, f"g++ of {driver.name}")
+    seed = os.environ.get("SEED", random.getrandbits(31))
+    print(f"SEED={seed}")
+    output = build.run([program, tmp_path / "firmware", CYCLES, seed], "run of both")
+    assert f"the same for {CYCLES} cycles" in output
