@@ -26,6 +26,7 @@ ZERO = re.compile(r"VL_ZERO_W\(\d+, (?:vlSelfRef\.)?(\w+)\);")
 NAME = re.compile(
     r"\b(?!(?:vlSelfRef|[CSIQ]Data|if|else|for|while|do)\b|VL_)([A-Za-z_]\w*)",
 )
+CALL = re.compile(rf"{ROOT}___(\w+)\(vlSelf\);")
 PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
 
 Names = frozenset[str]
@@ -166,9 +167,11 @@ class Parser:
         if match := ZERO.fullmatch(line):
             return Plain((line,), Effect(NONE, *[self.names(match.group(1))] * 2))
         match = ASSIGNMENT.fullmatch(line)
-        if not match:
+        if not match and line.startswith("VL_"):
             names = self.names(line)
             return Plain((line,), Effect(names, NONE, names))
+        if not match:
+            raise FormError(f"it has {line!r}")
         name, index, value = match.groups()
         needs = self.names(value)
         if not index or (name in self.words and re.fullmatch(r"\[\d+U\]", index)):
@@ -221,6 +224,7 @@ class Design:
     outputs: set[str]
     locals: dict[str, str]  # types of the variables of the functions
     logic: Names  # signals that depend on others of the same cycle only
+    of_inputs: Names  # those that depend on inputs
     program: tuple[Statement, ...]  # what is evaluated at a rising edge
 
     @classmethod
@@ -228,12 +232,10 @@ class Design:
         """From the folder of Verilator's code."""
         code = "\n".join(file.read_text() for file in sorted(folder.glob(f"{ROOT}__*.cpp")))
         header = (folder / f"{ROOT}.h").read_text()
-        edge = [line for name in called(code, "eval_nba") for line in body(code, name)]
-        settle = [line for name in called(code, "eval_stl") for line in body(code, name)]
+        edge = triggered(code, "eval_nba")
         types = {m[2]: m[1] for line in header.splitlines() if (m := DECLARATION.fullmatch(line))}
         own = {m[2]: m[1] for line in edge if (m := DECLARATION.fullmatch(line))}
         lines = [line for line in edge if not DECLARATION.fullmatch(line)]
-        settles = [line for line in settle if not DECLARATION.fullmatch(line)]
         used = "\n".join(line for line in lines if not ZERO.fullmatch(line))
         words = {
             name: int(kind[7 : kind.index(">")])
@@ -246,26 +248,40 @@ class Design:
             {m[1]: int(m[2]) + 1 for m in re.finditer(r"VL_IN\w*\(&?(\w+),(\d+),0", header)},
             set(re.findall(r"VL_OUT\w*\(&?(\w+),", header)),
             own,
-            effect_of(Parser(settles, words).block()).changes,
+            changed(triggered(code, "eval_stl"), words),
+            changed(triggered(code, "eval_ico"), words),
             Parser(lines, words).block(),
         )
 
 
+def changed(lines: Sequence[str], words: Mapping[str, int]) -> Names:
+    """The signals that these lines change."""
+    statements = [line for line in lines if not DECLARATION.fullmatch(line)]
+    return effect_of(Parser(statements, words).block()).changes
+
+
 def body(code: str, name: str) -> list[str]:
-    """The lines of a function of the class."""
+    """The lines of a function of the class, with those of the functions that it calls."""
     pattern = rf"^(?:VL_ATTR_COLD )?void {ROOT}___{name}\({ROOT}\* vlSelf\) {{\n(.*?)^}}\n(?=\n|\Z)"
     match = re.search(pattern, code, re.M | re.S)
     if not match:
         raise FormError(f"there is no function {name}")
-    return [line for line in match[1].splitlines() if line and not line.startswith(PROLOGUE)]
-
-
-def called(code: str, name: str) -> list[str]:
-    """The functions that a function calls."""
-    found = re.findall(rf"{ROOT}___(\w+)\(vlSelf\);", "\n".join(body(code, name)))
-    if not found:
-        raise FormError(f"{name} calls nothing")
+    found = []
+    for line in match[1].splitlines():
+        if call := CALL.fullmatch(line):
+            found += body(code, call[1])
+        elif line and not line.startswith(PROLOGUE):
+            found.append(line)
     return found
+
+
+def triggered(code: str, name: str) -> list[str]:
+    """The lines of a function that does all in one condition, without the condition."""
+    lines = body(code, name)
+    begin = next((n for n, line in enumerate(lines) if line.startswith("if (")), 0)
+    if not lines[begin].startswith("if ((1ULL & vlSelfRef.__V") or lines[-1] != "}":
+        raise FormError(f"{name} is not one condition")
+    return lines[:begin] + lines[begin + 1 : -1]
 
 
 def array(name: str) -> str:
@@ -293,18 +309,18 @@ def logic_first(design: Design) -> list[Statement]:
                 needs |= effect.needs
                 changes |= effect.changes
         # executed once more before the first edge, it must compute the same again
-        whole = effect_of(design.program[n] for n in moved)
-        again = whole.needs & whole.changes
-        if not again:
+        computed: set[str] = set()
+        later = effect_of(design.program[n] for n in moved).changes
+        count = len(stays)
+        for n in moved:
+            effect = design.program[n].effect
+            if (effect.needs - computed - set(design.locals)) & later:
+                stays.add(n)
+            computed |= effect.sets
+        if len(stays) == count:
             first = set(moved)
             rest = [s for n, s in enumerate(design.program) if n not in first]
             return [design.program[n] for n in moved] + rest
-        known: Names = NONE
-        for n in moved:
-            if (design.program[n].effect.needs - known) & again:
-                stays.add(n)
-            else:
-                known |= design.program[n].effect.sets
 
 
 @dataclass
@@ -407,6 +423,8 @@ def function(design: Design) -> str:
     """The C++ of `rising_edge`, which evaluates a design whose inputs are set."""
     program = logic_first(design)
     whole = effect_of(program)
+    if late := whole.needs & design.of_inputs:
+        raise FormError(f"logic of inputs stays behind: {', '.join(sorted(late))}")
     kept = {array(name) for name in whole.needs} | design.outputs
     passing = {array(name) for name in whole.changes} - kept
     here = {**design.locals, **{name: design.types[name] for name in passing & set(design.types)}}
