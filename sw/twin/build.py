@@ -67,7 +67,7 @@ VERILATED = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "
 # how often each branch is taken, and the code of the second one is laid out by these counts.
 COUNT_BRANCHES = ["-fprofile-generate", "-fprofile-update=single"]
 USE_COUNTS = ["-fprofile-use", "-fprofile-partial-training"]
-# Tests and the short forms of figures run each library for a minute at most. Theirs is compiled once
+# Tests and the short forms of figures run each library for a minute at most. It is compiled once
 # and at -O1, in a fifth of the time; a cycle takes a tenth more, and the results are the same.
 SHORT_RUNS = "TWIN_SHORT_RUNS"  # in the environment, not empty: the twin is for short runs
 COMPILE_SOON = ["-O1" if flag == "-O3" else flag for flag in COMPILE]
