@@ -32,12 +32,14 @@ from twin.build import SHORT_RUNS
 PAGE = ROOT / "build" / "report" / "figures.html"
 PROCESSES = 2
 LONG = (
-    "full_clock",
     "s4",
+    "full_clock",
     "s0",
+    "twin_speed",
     "fine",
-    "bus",
     "calibration",
+    "s2s3",
+    "bus",
     "profile",
 )  # modules that take longest: first
 
