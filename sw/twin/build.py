@@ -314,6 +314,9 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
 
     def make(folder: Path) -> None:
         verilate(folder, verilator, source, "Vtop", parameters)
+        whole = folder / "whole.cpp"  # Verilator's headers are read once
+        parts = sorted(folder.glob("Vtop*.cpp"))
+        whole.write_text("".join(f'#include "{part.name}"\n' for part in parts))
         objects = []
         for file in own:
             objects.append(folder / f"{file.stem}.o")
@@ -342,7 +345,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
                 f"-I{folder}",
                 f"-I{verilator / 'include'}",
                 driver,
-                *sorted(folder.glob("Vtop*.cpp")),
+                whole,
                 *objects,
                 support,
                 "-o",
