@@ -436,8 +436,8 @@ def read(axes: int = 1, source: Path = SOURCE) -> list[Block]:
 
 
 @cache
-def compiled(axes: int, source: Path, text: bytes) -> tuple[Block, ...]:
-    """The blocks of a source with this text, which is compiled once."""
+def compiled(axes: int, source: Path, content: bytes) -> tuple[Block, ...]:
+    """The blocks of a source with this content, which is compiled once."""
     compiler = RDLCompiler()
     compiler.compile_file(str(source))
     blocks = []
