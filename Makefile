@@ -26,15 +26,15 @@ demo: $(SETUP) $(FIRMWARE)   ## the S0 stage: home it, move it, show where it we
 
 test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1
 	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(SEED), with SEED=$(SEED)))
-	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' $(PYTHON) -m pytest -q -n $(JOBS) $(if $K,-k '$K') tb
+	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' $(PYTHON) -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder $(if $K,-k '$K') tb
 
 check: fresh lint promises test prove quick  ## what every change must pass
 	@echo 'check: all passed'
 
 promises: $(SETUP)  ## what the project promises of its code: units, latencies, imports, tests, types
 	$(call say,promises: columns; units of ports; latencies; imports; tests that can fail; strict types)
-	@failed=0; for check in $(PROMISES); do $(PYTHON) -m tools.check_$$check || failed=1; done; exit $$failed
-PROMISES := columns ports latency imports tests types
+	@printf '%s\n' $(PROMISES) | xargs -P $(JOBS) -I{} $(PYTHON) -m tools.check_{}
+PROMISES := types imports tests columns ports latency
 
 lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the layout of all code
 	$(call say,lint: verilator -Wall over $(words $(RTL)) modules; ruff; the formatters)

@@ -14,7 +14,7 @@ the program wants it sooner, the assembler inserts lines that only pass acc on.
 
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -1016,8 +1016,20 @@ def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool
     """
     labels = {line.label: n for n, line in enumerate(lines) if line.label}
     follow = successors(lines)
-    tested = tested_later(lines, follow)
-    memory: dict[tuple[int, object], tuple[int, ...]] = {}
+    bits = {name: 1 << n for n, name in enumerate(STEADY)}
+
+    def mask(names: Iterable[str]) -> int:
+        return sum(bits[name] for name in names if name in bits)
+
+    tested = [mask(names) for names in tested_later(lines, follow)]
+    changed = [mask(line.changes) for line in lines]
+    given = [(0, 0)] * len(lines)  # (which conditions are known after a line, which of them hold)
+    for n, line in enumerate(lines):
+        verb, _, flag = line.action.partition(" ")
+        if line.action == "load_context":
+            given[n] = mask(name for name in PASSING if name != "ticking"), 0
+        elif flag in STEADY and verb in ("set", "clear"):
+            given[n] = bits[flag], bits[flag] * (verb == "set")
 
     def repeated(n: int) -> int:
         if lines[n].condition != "loop":
@@ -1025,31 +1037,43 @@ def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool
         counts = [line.action for line in lines[:n] if line.action.startswith("count")]
         return int(counts[-1].split(" ")[1])
 
-    def walk(n: int, taken: tuple[int, ...], known: frozenset[tuple[str, bool]]) -> tuple[int, ...]:
+    def passes_on(n: int) -> bool:
+        """Whether the next line follows, in whatever state."""
+        return n != end and follow[n] == [n + 1] and not changed[n] and given[n] == (0, 0)
+
+    fork = [*range(len(lines))]  # the next line from here that does more
+    for n in reversed(range(len(lines) - 1)):
+        if passes_on(n):
+            fork[n] = fork[n + 1]
+    memory: dict[tuple[int, tuple[int, ...], int, int], tuple[int, ...]] = {}
+
+    def walk(begin: int, taken: tuple[int, ...], known: int, true: int) -> tuple[int, ...]:
         """The lines from here to the end, none if it is not reached."""
-        line = lines[n]
-        if n == end:
-            return (n,)
-        key = n, (taken, known)
-        if key in memory:
-            return memory[key]
-        facts = {name: value for name, value in known if name not in line.changes}
-        verb, _, flag = line.action.partition(" ")
-        if line.action == "load_context":
-            facts |= {name: False for name in PASSING if name != "ticking"}
-        if flag in STEADY and verb in ("set", "clear"):
-            facts[flag] = verb == "set"
+        n = fork[begin]
+        known &= tested[n]
+        true &= known
+        key = n, taken, known, true
+        if key not in memory:
+            memory[key] = (n,) if n == end else branch(n, taken, known, true)
+        return (*range(begin, n), *memory[key]) if memory[key] else ()
+
+    def branch(n: int, taken: tuple[int, ...], known: int, true: int) -> tuple[int, ...]:
+        line, count = lines[n], repeated(n)
+        more, hold = given[n]
+        stays = known & ~changed[n] & ~more
+        facts = stays | more, true & stays | hold
         best: tuple[int, ...] = ()
         for m in follow[n]:
             if m == n:
                 continue
             jumps = bool(line.target) and m == labels[line.target]
-            after, now = dict(facts), taken
-            if line.condition in STEADY:
+            after, now = facts, taken
+            if bit := bits.get(line.condition, 0):
                 value = jumps != line.unless
-                if dict(known).get(line.condition, value) != value:
+                if known & bit and bool(true & bit) != value:
                     continue
-                after.setdefault(line.condition, value)
+                if not facts[0] & bit:
+                    after = facts[0] | bit, facts[1] | bit * value
             if line.condition == "filters" and filters == 0 and not jumps:
                 continue
             if m <= n:
@@ -1057,14 +1081,14 @@ def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool
                 if taken.count(m) >= most:
                     continue
                 now = tuple(sorted((*taken, m)))
-            rest = walk(m, now, frozenset(fact for fact in after.items() if fact[0] in tested[m]))
-            if rest and len(rest) + repeated(n) > len(best):
-                best = (n,) * repeated(n) + rest
-        memory[key] = best
+            rest = walk(m, now, *after)
+            if rest and len(rest) + count > len(best):
+                best = (n,) * count + rest
         return best
 
     first = {"ticking": ticking, "unfiltered": filters == 0} | dict.fromkeys(PASSING[1:], False)
-    return list(walk(labels[begin], (), frozenset(first.items())))
+    true = mask(name for name, value in first.items() if value)
+    return list(walk(labels[begin], (), mask(first), true))
 
 
 def worst(lines: list[Line], filters: int) -> tuple[int, int]:

@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -431,6 +432,12 @@ def register_of(node: Node) -> Register:
 
 def read(axes: int = 1, source: Path = SOURCE) -> list[Block]:
     """The blocks of a node with so many axes, in the order of their addresses."""
+    return list(compiled(axes, source, source.read_bytes()))
+
+
+@cache
+def compiled(axes: int, source: Path, content: bytes) -> tuple[Block, ...]:
+    """The blocks of a source with this content, which is compiled once."""
     compiler = RDLCompiler()
     compiler.compile_file(str(source))
     blocks = []
@@ -444,7 +451,7 @@ def read(axes: int = 1, source: Path = SOURCE) -> list[Block]:
         registers = tuple(register_of(r) for r in node.children())
         text = " ".join(str(node.get_property("name")).split())
         blocks.append(Block(node.inst_name, text, base, stride, count, registers))
-    return blocks
+    return tuple(blocks)
 
 
 def crc(source: Path = SOURCE) -> int:

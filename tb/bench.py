@@ -178,7 +178,7 @@ async def start(dut, period_ns=10, **inputs):
     for name, level in inputs.items():
         getattr(dut, name).value = level
     dut.rst.value = 1
-    Clock(dut.clk, period_ns, "ns").start()
+    Clock(dut.clk, period_ns, "ns", impl="gpi").start(start_high=False)
     for _ in range(2):
         await RisingEdge(dut.clk)
     dut.rst.value = 0

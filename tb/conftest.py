@@ -1,12 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The seed is decided here once, before any worker of pytest-xdist starts."""
+"""The seed is decided here once, before any worker of pytest-xdist starts; and twins are built for
+short runs. Files that take long come first, so that none of them is left to one worker at the end.
+"""
 
 import os
 
 from tb.bench import seed
+from twin.build import SHORT_RUNS
 
+os.environ[SHORT_RUNS] = "1"
 DRAWN = os.environ.get("SEED") == "random"
 SEED = seed()
+
+
+LONG = ("docs", "system", "control", "twin", "peripheral")  # folders, from the longest on
+
+
+def pytest_collection_modifyitems(items):
+    order = {name: n for n, name in enumerate(LONG)}
+    items.sort(key=lambda item: order.get(item.path.parent.name, len(LONG)))
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -31,6 +31,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tools import ROOT
+from twin.build import SHORT_RUNS
 
 PROGRAMS = ROOT / "build" / "venv" / "bin"
 COMMAND = re.compile(r"(moire|make|export|pip|build/venv/bin/\w+)\b")
@@ -38,7 +39,7 @@ HARDWARE = re.compile(r"/dev/ttyUSB0|COM3|socket://127\.0\.0\.1:2218")
 RESOLVED_ONLY = re.compile(r"make (test$|check|figures|soak|board|load|flash)")
 ENDLESS = re.compile(r"moire\b.* watch\b|moire watch\b")
 EXPERIMENT = re.compile(r"build/venv/bin/python -m experiments\.")
-LONGEST_S = 20  # of an experiment, unless the whole is asked for
+LONGEST_S = 12  # of an experiment, unless the whole is asked for; its twin is built within 4
 ENDLESS_S = 8  # of a command that only Ctrl-C ends
 PATIENCE_S = 600  # of every other command
 
@@ -97,6 +98,8 @@ class Session:
         self.page, self.folder, self.whole = page, folder, whole
         self.environment = os.environ | {"PATH": f"{PROGRAMS}{os.pathsep}{os.environ['PATH']}"}
         self.environment.pop("MOIRE_PORT", None)
+        if not whole:
+            self.environment[SHORT_RUNS] = "1"
         self.server: subprocess.Popen[str] | None = None
         self.usual_ports = open(ROOT / "build" / "docs_commands.lock", "w")
         self.port = ""

@@ -12,6 +12,7 @@ The exit code is 0 if every value is within its bound.
 
 import argparse
 import io
+import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -26,16 +27,19 @@ from figures.comparison import page
 from figures.synthesis import SynthesisError
 from moire.errors import MoireError
 from twin import BuildError
+from twin.build import SHORT_RUNS
 
 PAGE = ROOT / "build" / "report" / "figures.html"
 PROCESSES = 2
 LONG = (
-    "full_clock",
     "s4",
+    "full_clock",
     "s0",
+    "twin_speed",
     "fine",
-    "bus",
     "calibration",
+    "s2s3",
+    "bus",
     "profile",
 )  # modules that take longest: first
 
@@ -158,6 +162,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if fixed := [name for name in names if not figures[name].seeded]:
             parser.error(f"{fixed[0]} draws no random numbers: it takes no seed")
     quick, seed = options.quick, options.seed
+    if quick:
+        os.environ[SHORT_RUNS] = "1"
     together = options.all and quick
     running = in_parallel(seed) if together else one_by_one(names, quick, seed)
     outcomes, passed = [], []

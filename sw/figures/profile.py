@@ -14,8 +14,8 @@ import ruckig  # type: ignore[import-not-found]
 from figures.common import ROOT, Figure, Quick, bar, console, shares
 from tables.engine_microcode import ADDRESS, OPERANDS
 from twin.build import (
-    COMPILE,
     VERILATED,
+    compile_flags,
     compiler,
     digest,
     made_once,
@@ -58,7 +58,7 @@ def profile_run() -> Path:
         *sorted(FIRMWARE.rglob("*.h")),
         *sorted((ROOT / "rtl" / "control").glob("*.sv")),
     ]
-    support = runtime(tool, verilator)
+    support, flags = runtime(tool, verilator), compile_flags()
 
     def make(folder: Path) -> None:
         words = {"ANCHOR": ADDRESS["anchor"], "MOVED": ADDRESS["moved"]}
@@ -72,7 +72,7 @@ def profile_run() -> Path:
         run(
             [
                 tool,
-                *COMPILE,
+                *flags,
                 *VERILATED,
                 *(f"-D{name.upper()}={OPERANDS[name]}" for name in WORDS),
                 f"-I{folder}",
@@ -90,7 +90,7 @@ def profile_run() -> Path:
         )
 
     return made_once(
-        ROOT / "build" / "simulation" / f"profile_run-{digest(files, tool, COMPILE)}", "run", make
+        ROOT / "build" / "simulation" / f"profile_run-{digest(files, tool, flags)}", "run", make
     )
 
 

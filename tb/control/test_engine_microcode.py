@@ -26,7 +26,7 @@ from tb.bench import run
 async def latency_is_1_and_every_line_is_that_of_the_generator(dut):
     lines = [code for _, code in codes()]
     lines += [0] * (LINES - len(lines))
-    Clock(dut.clk, 10, "ns").start()
+    Clock(dut.clk, 10, "ns", impl="gpi").start()
     await FallingEdge(dut.clk)
     for number, code in enumerate(lines):
         dut.next.value, dut.target.value = number, LINES - 1 - number

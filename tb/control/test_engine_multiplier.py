@@ -30,7 +30,7 @@ class Multiplier:
 
 
 async def begin(dut):
-    Clock(dut.clk, 10, "ns").start()
+    Clock(dut.clk, 10, "ns", impl="gpi").start()
     await FallingEdge(dut.clk)
     return Multiplier(dut)
 

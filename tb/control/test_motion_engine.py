@@ -8,7 +8,7 @@ import random
 
 import cocotb
 import pytest
-from cocotb.triggers import FallingEdge, RisingEdge
+from cocotb.triggers import FallingEdge
 
 from tables.engine_microcode import (
     CONDITIONS,
@@ -45,6 +45,10 @@ class Engine:
 
     def __init__(self, dut):
         self.dut = dut
+        self.falling = FallingEdge(dut.clk)
+        self.result_valid, self.overrun = dut.result_valid, dut.overrun  # looked up once
+        self.busy, self.waits = dut.busy, dut.waits
+        self.setting_waits = dut.setting_waits
         self.axes = int(dut.AXES.value)
         self.models = [Axis(int(dut.FILTERS.value)) for _ in range(self.axes)]
         self.position = [0] * self.axes
@@ -100,8 +104,7 @@ class Engine:
         if tick:
             dut.tick.value = 1
             dut.now.value = self.now
-        await RisingEdge(dut.clk)
-        await FallingEdge(dut.clk)
+        await self.falling
         for name in dict(strobes):
             getattr(dut, STROBES[name]).value = 0
         if tick:
@@ -127,7 +130,12 @@ class Engine:
                 self.lost_off[n] |= int(off)
         for n, (_, down) in stepped.items():
             self.steps[n] = self.since, down
-        if int(dut.result_valid.value):
+        self.collect()
+
+    def collect(self):
+        """What the engine gives in this cycle."""
+        if int(self.result_valid.value):
+            dut = self.dut
             kind = GIVEN[int(dut.result_kind.value)]
             value = dut.result.value.to_signed()
             flag = int(dut.result_flag.value)
@@ -137,15 +145,28 @@ class Engine:
             if kind in ("error", "command", "steps"):
                 shown = (kind, value, flag)
             self.got[int(dut.result_axis.value)].append(shown)
-        self.overruns += int(dut.overrun.value)
+        self.overruns += int(self.overrun.value)
+
+    async def idle(self, cycles, condition=lambda: False):
+        """Advance so many cycles without any event, or fewer, until the condition holds; return how
+        many. The levels stay, so what was lost by them is known after the first cycle.
+        """
+        for cycle in range(cycles):
+            if condition():
+                return cycle
+            if cycle == 0:
+                await self.clk()
+            else:
+                await self.falling
+                self.since += 1
+                self.collect()
+        return cycles
 
     async def until(self, condition, most):
         """Clock until the condition holds; return the cycles."""
-        for cycles in range(most):
-            if condition():
-                return cycles
-            await self.clk()
-        raise AssertionError(f"not within {most} cycles")
+        cycles = await self.idle(most, condition)
+        assert cycles < most, f"not within {most} cycles"
+        return cycles
 
     async def settings(self, n, **values):
         """Write settings of axis n; `filters` is a list of (coefficients, in use)."""
@@ -168,7 +189,7 @@ class Engine:
             self.dut.setting_write.value = 1
             await self.clk()
             self.dut.setting_write.value = 0
-            await self.until(lambda: not int(self.dut.setting_waits.value), 100)
+            await self.until(lambda: not int(self.setting_waits.value), 100)
 
     def check(self, n, wanted):
         wanted = [
@@ -184,9 +205,8 @@ class Engine:
         """Requests of one axis, served between two ticks."""
         await self.clk(strobes={name: 1 << n for name in requests})
         assert int(self.dut.waits.value) >> n & 1
-        await self.until(lambda: not int(self.dut.waits.value), 300)
-        for _ in range(60):
-            await self.clk()
+        await self.until(lambda: not int(self.waits.value), 300)
+        await self.idle(60)
         self.check(n, self.models[n].serve(requests, self.position[n]))
 
     async def push(self, n, velocity, acceleration, jerk, ticks, last=0):
@@ -212,12 +232,11 @@ class Engine:
         for name, bits in requests.items():
             if name == "gains":
                 self.gains = [self.gains[n] | bits >> n & 1 for n in range(self.axes)]
-        for _ in range(gap):
-            await self.clk()
+        await self.idle(gap)
         if requests:
             await self.clk(strobes=requests)
         await self.clk(tick=1, **events)
-        cycles = await self.until(lambda: not int(self.dut.busy.value), 5000)
+        cycles = await self.until(lambda: not int(self.busy.value), 5000)
         await self.clk()
         assert cycles <= int(self.dut.cycles.value) and self.overruns == 0
         self.longest = max(self.longest, cycles)
@@ -326,7 +345,7 @@ async def a_tick_that_comes_too_soon_is_an_overrun(dut):
     await engine.clk(tick=1)
     await engine.clk()
     assert engine.overruns == 1
-    await engine.until(lambda: not int(dut.busy.value), 5000)
+    await engine.until(lambda: not int(engine.busy.value), 5000)
     assert engine.overruns == 1
     await engine.clk(tick=1)
     assert engine.overruns == 1
@@ -430,7 +449,7 @@ async def a_shift_of_the_origin_never_disturbs_the_error(dut):
         model = engine.models[0]
         # the request is served before the tick or at it: the results are the same but for `state`
         await engine.clk(tick=1)
-        await engine.until(lambda: not int(dut.busy.value), 5000)
+        await engine.until(lambda: not int(engine.busy.value), 5000)
         await engine.clk()
         positions, steps, lost, lost_off = engine.seen
         wanted = model.tick(

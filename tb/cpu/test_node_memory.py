@@ -44,7 +44,7 @@ async def read(dut, address):
 
 async def begin(dut):
     dut.write.value = 0
-    Clock(dut.clk, 10, "ns").start()
+    Clock(dut.clk, 10, "ns", impl="gpi").start()
     await FallingEdge(dut.clk)
 
 

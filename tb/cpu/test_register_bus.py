@@ -40,7 +40,7 @@ async def check(dut, model, select, address, answering=True):
 
 
 async def begin(dut):
-    Clock(dut.clk, 10, "ns").start()
+    Clock(dut.clk, 10, "ns", impl="gpi").start()
     for name in ("select", "address", *(f"{b}_rdata" for b in ("memory", *ALONE, *OF_AXES))):
         getattr(dut, name).value = 0
     dut.select.value = 1
