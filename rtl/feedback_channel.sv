@@ -263,6 +263,7 @@ module feedback_channel #(
             .hold    (outlier_hold),
             // sample
             .valid   (converted),
+            .axis    (1'b0),
             .sin     (raw_sin),
             .cos     (raw_cos),
             // filtered sample
@@ -277,19 +278,21 @@ module feedback_channel #(
             .clk,
             .rst,
             // settings
-            .load   (load_correction),
+            .load     (load_correction),
+            .load_axis(1'b0),
             .sin_offset,
             .cos_offset,
             .gain,
             .quadrature_error,
             // sample
-            .valid  (sampled),
+            .valid    (sampled),
+            .axis     (1'b0),
             .sin,
             .cos,
             // corrected sample
-            .done   (corrected),
-            .sin_out(corrected_sin),
-            .cos_out(corrected_cos)
+            .done     (corrected),
+            .sin_out  (corrected_sin),
+            .cos_out  (corrected_cos)
         );
         arctan_pipelined #(
             .W    (16),
@@ -311,17 +314,19 @@ module feedback_channel #(
                 .clk,
                 .rst,
                 // table
-                .enable   (harmonic_enable),
-                .write    (harmonic_write),
-                .point    (harmonic_at),
-                .value    (harmonic_value),
-                .swap     (swap_harmonics),
+                .enable    (harmonic_enable),
+                .table_axis(1'b0),
+                .write     (harmonic_write),
+                .point     (harmonic_at),
+                .value     (harmonic_value),
+                .swap      (swap_harmonics),
                 // phase
-                .valid    (phase_valid),
-                .phase    (plain_phase),
+                .valid     (phase_valid),
+                .axis      (1'b0),
+                .phase     (plain_phase),
                 // corrected phase
-                .done     (harmonics_off),
-                .phase_out(phase)
+                .done      (harmonics_off),
+                .phase_out (phase)
             );
         end else begin : g_no_harmonics
             assign {harmonics_off, phase} = {phase_valid, plain_phase};
@@ -334,6 +339,7 @@ module feedback_channel #(
             .rst,
             // phase
             .valid    (harmonics_off),
+            .axis     (1'b0),
             .phase,
             // step
             .done     (tracked),
@@ -344,13 +350,13 @@ module feedback_channel #(
         count_phase_check u_count_phase_check (
             .clk,
             .rst,
-            .limit   (disagreement_limit),
+            .learn(by_counts || (shift && shift_periods == '0)),
             // both positions
-            .valid   (scale_valid),
-            .position(scale_position),
-            .count   (quadrature_count),
-            .shift,
-            .shift_periods,
+            .valid(stepped),
+            .axis (1'b0),
+            .step,
+            .count(quadrature_count),
+            .limit(disagreement_limit),
             .disagreement
         );
         if (HAS_MONITOR != 0) begin : g_monitor
