@@ -37,7 +37,7 @@ module axis_memory #(
 
         wire unused = &{1'b0, write_axis, axis};
     end else begin : g_many
-        (* ram_style = "distributed" *)logic [WIDTH-1:0] words[0:AXES-1];
+        (* ram_style = "distributed" *) logic [WIDTH-1:0] words[0:AXES-1];
 
         always_ff @(posedge clk) if (write) words[write_axis] <= value;
         assign stored = words[axis];

@@ -13,22 +13,22 @@ module correction_settings #(
     // bits of the number of an axis
     localparam int A    = AXES == 1 ? 1 : $clog2(AXES)
 ) (
-    input  wire                clk,
-    input  wire                rst,                       // level: the values of all axes are reset
+    input wire clk,
+    input wire rst,  // level: the values of all axes are reset
     // settings
-    input  wire        [A-1:0] setting_axis,              // number of the axis that is set
-    input  wire        [ 31:0] setting,                   // value, as in the registers
-    input  wire                offset_written,            // strobe: it has both offsets
-    input  wire                gain_written,              // strobe: it is the gain
-    input  wire                quadrature_error_written,  // strobe: it is the quadrature error
-    input  wire                load,                      // strobe: load the values of the axis
+    input wire [A-1:0] setting_axis,  // number of the axis that is set
+    input wire [31:0] setting,  // value, as in the registers
+    input wire offset_written,  // strobe: it has both offsets
+    input wire gain_written,  // strobe: it is the gain
+    input wire quadrature_error_written,  // strobe: it is the quadrature error
+    input wire load,  // strobe: load the values of the axis
     // values that are loaded
-    output logic               load_out,                  // strobe: the values below are new
-    output logic       [A-1:0] axis,                      // number of their axis
-    output logic signed [15:0] sin_offset,                // full scale = 2^15
-    output logic signed [15:0] cos_offset,                // full scale = 2^15
-    output logic        [16:0] gain,                      // factor, 1.0 = 2^16
-    output logic signed [16:0] quadrature_error           // factor, 1.0 = 2^16
+    output logic load_out,  // strobe: the values below are new
+    output logic [A-1:0] axis,  // number of their axis
+    output logic signed [15:0] sin_offset,  // full scale = 2^15
+    output logic signed [15:0] cos_offset,  // full scale = 2^15
+    output logic [16:0] gain,  // factor, 1.0 = 2^16
+    output logic signed [16:0] quadrature_error  // factor, 1.0 = 2^16
 );
     logic [AXES-1:0] offset_known, gain_known, quadrature_error_known;  // written since reset
     wire [31:0] offset_stored;

@@ -21,51 +21,51 @@ module interpolation_chain #(
     // bits of the number of an axis
     localparam int A             = AXES == 1 ? 1 : $clog2(AXES)
 ) (
-    input  wire                      clk,
-    input  wire                      rst,
+    input wire clk,
+    input wire rst,
     // settings, as in the registers
-    input  wire         [     A-1:0] setting_axis,              // number of the axis that is set
-    input  wire         [      31:0] setting,                   // value
-    input  wire                      outlier_written,           // strobe: {hold, step}, 8 bits each
-    input  wire                      limit_written,             // strobe: limit of the count check
-    input  wire                      offset_written,            // strobe: {cos, sin}, 16 bits each
-    input  wire                      gain_written,              // strobe: gain of the sine
-    input  wire                      quadrature_error_written,  // strobe: quadrature error
-    input  wire                      load_correction,           // strobe: use the last three
-    input  wire                      harmonic_point_written,    // strobe: {point, value}
-    input  wire                      swap_harmonics,            // strobe: use the new points
+    input wire [A-1:0] setting_axis,  // number of the axis that is set
+    input wire [31:0] setting,  // value
+    input wire outlier_written,  // strobe: {hold, step}, 8 bits each
+    input wire limit_written,  // strobe: limit of the count check
+    input wire offset_written,  // strobe: {cos, sin}, 16 bits each
+    input wire gain_written,  // strobe: gain of the sine
+    input wire quadrature_error_written,  // strobe: quadrature error
+    input wire load_correction,  // strobe: use the last three
+    input wire harmonic_point_written,  // strobe: {point, value}
+    input wire swap_harmonics,  // strobe: use the new points
     // bit n: axis n
-    input  wire         [  AXES-1:0] harmonic_enable,           // levels: correct the harmonics
-    input  wire         [  AXES-1:0] learn,                     // levels: learn the count again
+    input wire [AXES-1:0] harmonic_enable,  // levels: correct the harmonics
+    input wire [AXES-1:0] learn,  // levels: learn the count again
     // samples and counts, bit n or the bits from W n or 32 n on: axis n
-    input  wire         [  AXES-1:0] valid,                     // strobes: a new sample
-    input  wire         [W*AXES-1:0] sin,                       // counts; held until the next one
-    input  wire         [W*AXES-1:0] cos,                       // counts; held until the next one
-    input  wire         [32*AXES-1:0] count,                    // 1/4 period, wraps
+    input wire [AXES-1:0] valid,  // strobes: a new sample
+    input wire [W*AXES-1:0] sin,  // counts; held until the next one
+    input wire [W*AXES-1:0] cos,  // counts; held until the next one
+    input wire [32*AXES-1:0] count,  // 1/4 period, wraps
     // sample that is served
-    output logic                     served,                    // strobe: a sample is served
-    output logic        [     A-1:0] served_axis,               // number of its axis
-    output logic signed [     W-1:0] served_sin,                // counts
-    output logic signed [     W-1:0] served_cos,                // counts
+    output logic served,  // strobe: a sample is served
+    output logic [A-1:0] served_axis,  // number of its axis
+    output logic signed [W-1:0] served_sin,  // counts
+    output logic signed [W-1:0] served_cos,  // counts
     // filtered sample
-    output logic                     sampled,                   // strobe: it is new
-    output logic        [     A-1:0] sampled_axis,              // number of its axis
-    output logic signed [     W-1:0] sampled_sin,               // counts
-    output logic signed [     W-1:0] sampled_cos,               // counts
-    output logic                     rejected,                  // strobe: an outlier was held back
+    output logic sampled,  // strobe: it is new
+    output logic [A-1:0] sampled_axis,  // number of its axis
+    output logic signed [W-1:0] sampled_sin,  // counts
+    output logic signed [W-1:0] sampled_cos,  // counts
+    output logic rejected,  // strobe: an outlier was held back
     // phase before the harmonic correction
-    output logic                     phase_valid,               // strobe: it is new
-    output logic        [     A-1:0] phase_axis,                // number of its axis
-    output logic        [      15:0] plain_phase,               // 2^-16 period
+    output logic phase_valid,  // strobe: it is new
+    output logic [A-1:0] phase_axis,  // number of its axis
+    output logic [15:0] plain_phase,  // 2^-16 period
     // step of the position
-    output logic                     done,                      // strobe: step leads to phase
-    output logic        [     A-1:0] done_axis,                 // number of its axis
-    output logic signed [      16:0] step,                      // 2^-16 period
-    output logic        [      15:0] phase,                     // 2^-16 period, corrected
-    output logic                     overspeed,                 // strobe, with done: too fast
+    output logic done,  // strobe: step leads to phase
+    output logic [A-1:0] done_axis,  // number of its axis
+    output logic signed [16:0] step,  // 2^-16 period
+    output logic [15:0] phase,  // 2^-16 period, corrected
+    output logic overspeed,  // strobe, with done: too fast
     // faults, bit n: axis n
-    output logic        [  AXES-1:0] disagreement,              // levels: position against count
-    output logic        [  AXES-1:0] overrun                    // strobes: a sample was lost
+    output logic [AXES-1:0] disagreement,  // levels: position against count
+    output logic [AXES-1:0] overrun  // strobes: a sample was lost
 );
     localparam int CORRECTED = 3;  // cycles from sampled to corrected
     localparam int FOUND = 12;  // from there to phase_valid
@@ -81,10 +81,10 @@ module interpolation_chain #(
     wire        [16:0] gain;
     wire signed [16:0] quadrature_error;
     wire [15:0] amplitude, straight_phase;
-    wire [A-1:0] straight_axis;
-    wire [19:0] limit;
-    wire signed [17:0] harmonic_value = $signed(setting[17:0]);
-    wire signed [31:0] done_count = $signed(count[32*done_axis+:32]);
+    wire        [A-1:0] straight_axis;
+    wire        [ 19:0] limit;
+    wire signed [ 17:0] harmonic_value = $signed(setting[17:0]);
+    wire signed [ 31:0] done_count = $signed(count[32*done_axis+:32]);
 
     if (AXES == 1) begin : g_one
         assign {served, served_axis, overrun} = {valid, 1'b0, 1'b0};

@@ -20,18 +20,18 @@ module sample_arbiter #(
     // bits of the number of an axis
     localparam int A    = AXES == 1 ? 1 : $clog2(AXES)
 ) (
-    input  wire                 clk,
-    input  wire                 rst,      // level: drops the samples that wait
+    input  wire                      clk,
+    input  wire                      rst,      // level: drops the samples that wait
     // samples, bit n or the bits from W n on: axis n
-    input  wire  [    AXES-1:0] valid,    // strobes: a new sample
-    input  wire  [  W*AXES-1:0] sin,      // counts; held until the next sample
-    input  wire  [  W*AXES-1:0] cos,      // counts; held until the next sample
+    input  wire         [  AXES-1:0] valid,    // strobes: a new sample
+    input  wire         [W*AXES-1:0] sin,      // counts; held until the next sample
+    input  wire         [W*AXES-1:0] cos,      // counts; held until the next sample
     // sample that is served
-    output logic                done,     // strobe: axis, sin_out and cos_out are new
-    output logic [       A-1:0] axis,     // number of its axis
-    output logic signed [W-1:0] sin_out,  // counts
-    output logic signed [W-1:0] cos_out,  // counts
-    output logic [    AXES-1:0] overrun   // strobes: a sample of axis n was lost
+    output logic                     done,     // strobe: axis, sin_out and cos_out are new
+    output logic        [     A-1:0] axis,     // number of its axis
+    output logic signed [     W-1:0] sin_out,  // counts
+    output logic signed [     W-1:0] cos_out,  // counts
+    output logic        [  AXES-1:0] overrun   // strobes: a sample of axis n was lost
 );
     if (AXES < 2 || AXES > 16) begin : g_check
         AXES_MUST_BE_FROM_2_TO_16 u_error ();
@@ -42,7 +42,7 @@ module sample_arbiter #(
     wire  [AXES-1:0] first = due & -due;  // the lowest bit that is set
 
     logic [   A-1:0] number;
-    logic [   W-1:0] first_sin, first_cos;
+    logic [W-1:0] first_sin, first_cos;
     always_comb begin
         number    = '0;
         first_sin = '0;
@@ -69,8 +69,8 @@ module sample_arbiter #(
     end
 
 `ifdef FORMAL
-    (* anyconst *)logic spaced;  // the samples of each axis are AXES cycles apart
-    logic past = 1'b0;
+    (* anyconst *)logic              spaced;  // the samples of each axis are AXES cycles apart
+    logic              past = 1'b0;
     logic [5*AXES-1:0] since;  // cycles since the last sample of each axis, up to AXES
     always @(posedge clk) begin
         past <= 1'b1;
