@@ -62,8 +62,9 @@ class Field:
     lsb: str
     text: str  # its own words, or none
     meaning: str  # its own words, or those of the register with its name
-    on_write: bool  # swmod: a strobe follows a write
+    on_write: bool  # swmod or passed: a strobe follows a write
     on_read: bool  # swacc: a strobe goes with a read
+    passed: bool  # a setting that its block does not hold
     needs: str  # parameter of the block without which a setting has no bits and reads 0
     signal: str  # its port in the block; a bit of the register's port in a vector
     state: str  # what the block reads: the port itself, or the bits that it holds
@@ -199,7 +200,8 @@ class Block:
 
     @property
     def parameters(self) -> list[str]:
-        return sorted({f.needs for _, f in self.fields if f.needs})
+        """Those that decide which settings the block itself holds."""
+        return sorted({f.needs for _, f in self.fields if f.needs and not f.passed})
 
     @property
     def wide_settings(self) -> list[Register]:
@@ -209,7 +211,7 @@ class Block:
     def unused(self) -> int:
         """The lowest bit of wdata that no register of this block has; all above are unused too."""
         taken = ("setting", "pulse", "sticky")
-        fields = [(r, f) for r, f in self.fields if f.kind in taken]
+        fields = [(r, f) for r, f in self.fields if f.kind in taken and not f.passed]
         return max((f.low + f.width - 32 * r.wide for r, f in fields), default=0)
 
     @property
@@ -237,7 +239,7 @@ class Layout:
 
     @property
     def parameters(self) -> list[str]:
-        return sorted({name for _, b in self.blocks for name in b.parameters})
+        return sorted({f.needs for _, b in self.blocks for _, f in b.fields if f.needs})
 
     @property
     def registers(self) -> list[tuple[int, Register]]:
@@ -349,6 +351,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
     kind, sw = kind_of(get, name), get("sw").name
     wide, vector = register.get_property("regwidth") == 64, bool(register.get_property("vector"))
     needs = get("needs") or register.get_property("needs") or ""
+    passed = bool(get("passed") or register.get_property("passed"))
     unknown = {"onread", "hwclr", "we", "wel", "sticky", "stickybit", "decr"}
     text, words = described(node), described(register)
     port = parent if name == "value" else f"{parent}_{name}"
@@ -362,6 +365,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         (get("swacc") and "r" not in sw, "swacc is only for what software reads"),
         (get("swmod") and kind != "setting", "swmod is only for what software sets"),
         (needs and kind != "setting", "only a setting may need a parameter"),
+        (passed and (kind != "setting" or wide), "only a setting of 32 bits may be passed"),
         (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
         (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
         (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),
@@ -383,8 +387,9 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         lsb=get("lsb") or "",
         text=text,
         meaning=text or (words if name == "value" else f"{words}: {name.replace('_', ' ')}"),
-        on_write=bool(get("swmod")),
+        on_write=bool(get("swmod")) or passed,
         on_read=bool(get("swacc")),
+        passed=passed,
         needs=needs,
         signal=signal,
         state=signal.replace(parent, parent + held, 1) if vector else port + held,
@@ -447,7 +452,7 @@ def ports(r: Register) -> list[tuple[str, str, str, list[str]]]:
         texts = [f"strobe: {t}" for t in texts] + ["strobe"] if strobe else texts
         texts += [f.measure, clause(f.meaning)] if f.unit else []
         out = f.kind in ("setting", "pulse")
-        if f.kind != "constant":
+        if f.kind != "constant" and not f.passed:
             shape = "" if strobe else f.shape
             found.append(("output logic" if out else "input  wire ", shape, f.port, texts))
     strobes = (("written", r.on_write, "new value"), ("read", r.on_read, "read in this cycle"))

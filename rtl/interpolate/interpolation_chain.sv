@@ -8,8 +8,8 @@
 // rate     one sample per cycle, of all axes together
 // behaviour  All axes share the arithmetic. State and settings of each axis are in LUT RAM, its
 //          harmonic tables in block RAM. The samples of each axis must be AXES cycles apart, or one
-//          may be lost, which overrun reports; see sample_arbiter. A setting is one word with the
-//          bits of its register, and acts on the samples that are served after it.
+//          may be lost, which overrun reports; see sample_arbiter. A setting is the word of its
+//          register, and acts on the samples that are served after it.
 // source   the chain of S0, once for a node
 // model    tb/interpolate/interpolation_chain.py, equal in every bit of every cycle
 `default_nettype none
@@ -21,70 +21,66 @@ module interpolation_chain #(
     // bits of the number of an axis
     localparam int A             = AXES == 1 ? 1 : $clog2(AXES)
 ) (
-    input wire clk,
-    input wire rst,
-    // settings, as in the registers
-    input wire [A-1:0] setting_axis,  // number of the axis that is set
-    input wire [31:0] setting,  // value
-    input wire outlier_written,  // strobe: {hold, step}, 8 bits each
-    input wire limit_written,  // strobe: limit of the count check
-    input wire offset_written,  // strobe: {cos, sin}, 16 bits each
-    input wire gain_written,  // strobe: gain of the sine
-    input wire quadrature_error_written,  // strobe: quadrature error
-    input wire load_correction,  // strobe: use the last three
-    input wire harmonic_point_written,  // strobe: {point, value}
-    input wire swap_harmonics,  // strobe: use the new points
+    input  wire                       clk,
+    input  wire                       rst,
+    // settings
+    input  wire         [       31:0] setting,          // value of a register, before its strobe
+    // strobes in the cycle after setting, of one axis at a time; bits from 8 n on: axis n
+    // 0 outlier filter, 1 limit of the count check, 2 offsets, 3 gain, 4 quadrature error, 5 use
+    // these three, 6 point of the harmonic table that is not in use, 7 use it
+    input  wire         [ 8*AXES-1:0] setting_written,
     // bit n: axis n
-    input wire [AXES-1:0] harmonic_enable,  // levels: correct the harmonics
-    input wire [AXES-1:0] learn,  // levels: learn the count again
+    input  wire         [   AXES-1:0] harmonic_enable,  // levels: correct the harmonics
+    input  wire         [   AXES-1:0] learn,            // levels: learn the count again
     // samples and counts, bit n or the bits from W n or 32 n on: axis n
-    input wire [AXES-1:0] valid,  // strobes: a new sample
-    input wire [W*AXES-1:0] sin,  // counts; held until the next one
-    input wire [W*AXES-1:0] cos,  // counts; held until the next one
-    input wire [32*AXES-1:0] count,  // 1/4 period, wraps
-    // sample that is served
-    output logic served,  // strobe: a sample is served
-    output logic [A-1:0] served_axis,  // number of its axis
-    output logic signed [W-1:0] served_sin,  // counts
-    output logic signed [W-1:0] served_cos,  // counts
-    // filtered sample
-    output logic sampled,  // strobe: it is new
-    output logic [A-1:0] sampled_axis,  // number of its axis
-    output logic signed [W-1:0] sampled_sin,  // counts
-    output logic signed [W-1:0] sampled_cos,  // counts
-    output logic rejected,  // strobe: an outlier was held back
+    input  wire         [   AXES-1:0] valid,            // strobes: a new sample
+    input  wire         [ W*AXES-1:0] sin,              // counts; held until the next sample
+    input  wire         [ W*AXES-1:0] cos,              // counts; held until the next sample
+    input  wire         [32*AXES-1:0] count,            // 1/4 period, wraps
+    // filtered sample, bit n: of axis n
+    output logic        [   AXES-1:0] sampled,          // strobes: it is new
+    output logic signed [      W-1:0] sampled_sin,      // counts
+    output logic signed [      W-1:0] sampled_cos,      // counts
+    output logic        [   AXES-1:0] rejected,         // strobes: an outlier was held back
     // phase before the harmonic correction
-    output logic phase_valid,  // strobe: it is new
-    output logic [A-1:0] phase_axis,  // number of its axis
-    output logic [15:0] plain_phase,  // 2^-16 period
+    output logic        [   AXES-1:0] phase_valid,      // strobes: it is new
+    output logic        [       15:0] plain_phase,      // 2^-16 period
     // step of the position
-    output logic done,  // strobe: step leads to phase
-    output logic [A-1:0] done_axis,  // number of its axis
-    output logic signed [16:0] step,  // 2^-16 period
-    output logic [15:0] phase,  // 2^-16 period, corrected
-    output logic overspeed,  // strobe, with done: too fast
-    // faults, bit n: axis n
-    output logic [AXES-1:0] disagreement,  // levels: position against count
-    output logic [AXES-1:0] overrun  // strobes: a sample was lost
+    output logic        [   AXES-1:0] done,             // strobes: step leads to phase
+    output logic signed [       16:0] step,             // 2^-16 period
+    output logic        [       15:0] phase,            // 2^-16 period, corrected
+    output logic        [   AXES-1:0] overspeed,        // strobes, with done: too fast
+    // faults
+    output logic        [   AXES-1:0] disagreement,     // levels: position against count
+    output logic        [   AXES-1:0] overrun           // strobes: a sample was lost
 );
     localparam int CORRECTED = 3;  // cycles from sampled to corrected
     localparam int FOUND = 12;  // from there to phase_valid
     localparam int STRAIGHT = HAS_HARMONICS != 0 ? 4 : 0;  // from there to straight
     localparam int CYCLES = CORRECTED + FOUND + STRAIGHT + 1;  // from sampled to done
 
-    logic [A*CYCLES-1:0] axes;  // of the samples in progress, the youngest at the right
+    // settings
+    logic [ 31:0] value;
+    logic [A-1:0] setting_axis;
+    logic [  7:0] written;  // strobes of setting_axis
     logic [AXES-1:0] outlier_known, limit_known;  // written since reset
     wire [7:0] outlier_step, outlier_hold;
-    wire load_values, corrected, straight;
+    wire [ 19:0] limit;
+    wire         load_values;
     wire [A-1:0] load_axis;
-    wire signed [15:0] sin_offset, cos_offset, corrected_sin, corrected_cos;
-    wire        [16:0] gain;
+    wire signed [15:0] sin_offset, cos_offset;
+    wire [16:0] gain;
     wire signed [16:0] quadrature_error;
+    wire signed [17:0] harmonic_value = $signed(value[17:0]);
+    // samples in progress
+    logic [A*CYCLES-1:0] axes;  // numbers of their axes from sampled on, the youngest at the right
+    wire served, filtered, held_back, corrected, found, straight, tracked, too_fast;
+    wire [A-1:0] served_axis, found_axis, straight_axis, tracked_axis;
+    logic [A-1:0] filtered_axis;
+    wire signed [W-1:0] served_sin, served_cos;
+    wire signed [15:0] corrected_sin, corrected_cos;
     wire [15:0] amplitude, straight_phase;
-    wire        [A-1:0] straight_axis;
-    wire        [ 19:0] limit;
-    wire signed [ 17:0] harmonic_value = $signed(setting[17:0]);
-    wire signed [ 31:0] done_count = $signed(count[32*done_axis+:32]);
+    wire signed [31:0] tracked_count = $signed(count[32*tracked_axis+:32]);
 
     if (AXES == 1) begin : g_one
         assign {served, served_axis, overrun} = {valid, 1'b0, 1'b0};
@@ -115,9 +111,9 @@ module interpolation_chain #(
         .WIDTH(16)
     ) u_outlier_settings (
         .clk,
-        .write     (outlier_written),
+        .write     (written[0]),
         .write_axis(setting_axis),
-        .value     (setting[15:0]),
+        .value     (value[31:16]),
         .axis      (served_axis),
         .stored    ({outlier_hold, outlier_step})
     );
@@ -126,10 +122,10 @@ module interpolation_chain #(
         .WIDTH(20)
     ) u_limit (
         .clk,
-        .write     (limit_written),
+        .write     (written[1]),
         .write_axis(setting_axis),
-        .value     (setting[19:0]),
-        .axis      (done_axis),
+        .value     (value[19:0]),
+        .axis      (tracked_axis),
         .stored    (limit)
     );
     correction_settings #(
@@ -139,14 +135,14 @@ module interpolation_chain #(
         .rst,
         // settings
         .setting_axis,
-        .setting,
-        .offset_written,
-        .gain_written,
-        .quadrature_error_written,
-        .load    (load_correction),
+        .setting                 (value),
+        .offset_written          (written[2]),
+        .gain_written            (written[3]),
+        .quadrature_error_written(written[4]),
+        .load                    (written[5]),
         // values that are loaded
-        .load_out(load_values),
-        .axis    (load_axis),
+        .load_out                (load_values),
+        .axis                    (load_axis),
         .sin_offset,
         .cos_offset,
         .gain,
@@ -160,18 +156,18 @@ module interpolation_chain #(
         .clk,
         .rst,
         // settings
-        .step   (outlier_known[served_axis] ? outlier_step : 8'd0),
-        .hold   (outlier_hold),
+        .step    (outlier_known[served_axis] ? outlier_step : 8'd0),
+        .hold    (outlier_hold),
         // sample
-        .valid  (served),
-        .axis   (served_axis),
-        .sin    (served_sin),
-        .cos    (served_cos),
+        .valid   (served),
+        .axis    (served_axis),
+        .sin     (served_sin),
+        .cos     (served_cos),
         // filtered sample
-        .done   (sampled),
-        .sin_out(sampled_sin),
-        .cos_out(sampled_cos),
-        .rejected
+        .done    (filtered),
+        .sin_out (sampled_sin),
+        .cos_out (sampled_cos),
+        .rejected(held_back)
     );
     signal_correction #(
         .W   (W),
@@ -187,8 +183,8 @@ module interpolation_chain #(
         .gain,
         .quadrature_error,
         // sample
-        .valid  (sampled),
-        .axis   (sampled_axis),
+        .valid  (filtered),
+        .axis   (filtered_axis),
         .sin    (sampled_sin),
         .cos    (sampled_cos),
         // corrected sample
@@ -207,7 +203,7 @@ module interpolation_chain #(
         .sin  (corrected_sin),
         .cos  (corrected_cos),
         // phase
-        .done (phase_valid),
+        .done (found),
         .phase(plain_phase),
         .amplitude
     );
@@ -220,21 +216,21 @@ module interpolation_chain #(
             // tables
             .enable    (harmonic_enable),
             .table_axis(setting_axis),
-            .write     (harmonic_point_written),
-            .point     (setting[25:18]),
+            .write     (written[6]),
+            .point     (value[25:18]),
             .value     (harmonic_value),
-            .swap      (swap_harmonics),
+            .swap      (written[7]),
             // phase
-            .valid     (phase_valid),
-            .axis      (phase_axis),
+            .valid     (found),
+            .axis      (found_axis),
             .phase     (plain_phase),
             // corrected phase
             .done      (straight),
             .phase_out (straight_phase)
         );
     end else begin : g_no_harmonics
-        assign {straight, straight_phase} = {phase_valid, plain_phase};
-        wire unused = &{1'b0, harmonic_enable, harmonic_point_written, swap_harmonics};
+        assign {straight, straight_phase} = {found, plain_phase};
+        wire unused = &{1'b0, harmonic_enable, written[7:6], harmonic_value};
     end
     fringe_tracker #(
         .AXES(AXES)
@@ -246,10 +242,10 @@ module interpolation_chain #(
         .axis     (straight_axis),
         .phase    (straight_phase),
         // step
-        .done,
+        .done     (tracked),
         .step,
         .phase_out(phase),
-        .overspeed
+        .overspeed(too_fast)
     );
     count_phase_check #(
         .AXES(AXES)
@@ -258,24 +254,41 @@ module interpolation_chain #(
         .rst,
         .learn,
         // both positions
-        .valid(done),
-        .axis (done_axis),
+        .valid(tracked),
+        .axis (tracked_axis),
         .step,
-        .count(done_count),
-        .limit(limit_known[done_axis] ? limit : 20'd0),
+        .count(tracked_count),
+        .limit(limit_known[tracked_axis] ? limit : 20'd0),
         .disagreement
     );
 
-    assign phase_axis    = axes[A*(CORRECTED+FOUND-1)+:A];
+    assign found_axis    = axes[A*(CORRECTED+FOUND-1)+:A];
     assign straight_axis = axes[A*(CYCLES-2)+:A];
-    assign done_axis     = axes[A*(CYCLES-1)+:A];
+    assign tracked_axis  = axes[A*(CYCLES-1)+:A];
+    assign sampled       = AXES'(filtered) << filtered_axis;
+    assign rejected      = AXES'(held_back) << filtered_axis;
+    assign phase_valid   = AXES'(found) << found_axis;
+    assign done          = AXES'(tracked) << tracked_axis;
+    assign overspeed     = AXES'(too_fast) << tracked_axis;
+
+    always_comb begin
+        written      = '0;
+        setting_axis = '0;
+        for (int n = 0; n < AXES; n++) begin
+            written = written | setting_written[8*n+:8];
+            if (setting_written[8*n+:8] != '0) setting_axis = setting_axis | A'(n);
+        end
+    end
 
     always_ff @(posedge clk) begin
-        sampled_axis <= served_axis;
-        axes         <= {axes[A*(CYCLES-1)-1:0], sampled_axis};
-        if (outlier_written) outlier_known[setting_axis] <= 1'b1;
-        if (limit_written) limit_known[setting_axis] <= 1'b1;
+        value         <= setting;
+        filtered_axis <= served_axis;
+        axes          <= {axes[A*(CYCLES-1)-1:0], filtered_axis};
+        if (written[0]) outlier_known[setting_axis] <= 1'b1;
+        if (written[1]) limit_known[setting_axis] <= 1'b1;
         if (rst) begin
+            filtered_axis <= '0;
+            axes          <= '0;
             outlier_known <= '0;
             limit_known   <= '0;
         end

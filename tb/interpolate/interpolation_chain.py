@@ -21,7 +21,6 @@ STEPS = 2  # of the arctan from register to register
 class Outputs(NamedTuple):
     """What leaves the chain after a cycle; None where its strobe is low."""
 
-    served: tuple[int, int, int] | None  # axis, sin, cos
     sampled: tuple[int, int, int, int] | None  # axis, sin, cos, rejected
     plain: tuple[int, int] | None  # axis, phase
     done: tuple[int, int, int, int] | None  # axis, step, phase, overspeed
@@ -119,9 +118,8 @@ class InterpolationChain:
         self.corrected, self.done, self.loaded = corrected if valid else None, done, loaded
         if rst:
             self.reset()
-        seen = self.served if several else OneAxis.served(samples)
         overrun = 0 if rst else sum(1 << n for n in lost)
-        return Outputs(seen, self.sampled, self.plain, self.done, self.check.disagreement, overrun)
+        return Outputs(self.sampled, self.plain, self.done, self.check.disagreement, overrun)
 
 
 class OwnChain:

@@ -9,17 +9,18 @@ import random
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
+from cocotb.types import LogicArray
 
 from tb.bench import needs, run, start
 from tb.interpolate.harmonic_correction import POINTS
 from tb.interpolate.interpolation_chain import InterpolationChain, Outputs, OwnChain
 from tb.interpolate.signal_correction import Settings
 
-STROBES = (
-    "outlier_written limit_written offset_written gain_written quadrature_error_written "
-    "load_correction harmonic_point_written swap_harmonics"
-).split()
-IDLE = dict(setting_axis=0, setting=0, harmonic_enable=0, learn=0, valid=0, sin=0, cos=0, count=0)
+# strobes of an axis, by bit
+OUTLIER, LIMIT, OFFSET, GAIN, QUADRATURE_ERROR, LOAD, POINT, SWAP = range(8)
+IDLE = dict(
+    setting=0, setting_written=0, harmonic_enable=0, learn=0, valid=0, sin=0, cos=0, count=0
+)
 
 
 def packed(values, width):
@@ -41,7 +42,7 @@ class Bench:
         return (21 if self.axes == 1 else 22) - (0 if self.harmonics else 4)
 
     async def begin(self):
-        await start(self.dut, **IDLE, **dict.fromkeys(STROBES, 0))
+        await start(self.dut, **IDLE)
         await FallingEdge(self.dut.clk)
         for axis in range(2 * self.axes):  # all tables are known to design and model
             await self.table([0] * POINTS, axis // 2)
@@ -49,34 +50,33 @@ class Bench:
         return self
 
     def word(self, words):
-        """Strobes and value of the settings `words`, of which one is a register."""
-        dut, value = self.dut, random.getrandbits(32)
-        written = words.get("correction", {})
-        for name in STROBES:
-            getattr(dut, name).value = 0
+        """(strobes, value) of the settings `words`, which are one register."""
+        written, value = words.get("correction", {}), random.getrandbits(32)
+        strobes = words.get("load", 0) << LOAD | words.get("swap", 0) << SWAP
         if "outlier" in words:
-            dut.outlier_written.value = 1
-            value = words["outlier"][1] << 8 | words["outlier"][0] | value >> 16 << 16
+            step, hold = words["outlier"]
+            return 1 << OUTLIER, hold << 24 | step << 16 | value % 65536
         if "limit" in words:
-            dut.limit_written.value, value = 1, words["limit"] | value >> 20 << 20
+            return 1 << LIMIT, words["limit"] | value >> 20 << 20
         if "sin_offset" in written:
-            dut.offset_written.value = 1
-            value = packed((written["sin_offset"], written["cos_offset"]), 16)
-        for name in ("gain", "quadrature_error"):
+            return 1 << OFFSET, packed((written["sin_offset"], written["cos_offset"]), 16)
+        for name, bit in (("gain", GAIN), ("quadrature_error", QUADRATURE_ERROR)):
             if name in written:
-                getattr(dut, f"{name}_written").value = 1
-                value = written[name] % (1 << 17) | value >> 17 << 17
+                return 1 << bit, written[name] % (1 << 17) | value >> 17 << 17
         if "point" in words:
             point, entry = words["point"]
-            dut.harmonic_point_written.value = 1
-            value = point << 18 | entry % (1 << 18) | value >> 26 << 26
-        dut.load_correction.value = words.get("load", 0)
-        dut.swap_harmonics.value = words.get("swap", 0)
-        dut.setting.value = value
+            return 1 << POINT, point << 18 | entry % (1 << 18) | value >> 26 << 26
+        return strobes, value
 
     async def cycle(self, new=None, axis=0, words=None, enable=None, learn=0, rst=0):
-        """New samples by axis, and a setting; returns what design and model give."""
+        """New samples by axis, and a setting, which is on the bus in the cycle before its strobe;
+        returns what design and model give. A cycle with a setting has another one before it.
+        """
         dut, new = self.dut, new or {}
+        strobes, setting = self.word(words or {})
+        if words:
+            dut.setting.value = setting
+            await self.cycle(enable=enable, learn=learn)
         enable = self.everyone if enable is None else enable
         for n, sample in new.items():
             self.held[n] = sample
@@ -84,8 +84,8 @@ class Bench:
         dut.sin.value = packed([sin for sin, _ in self.held], self.w)
         dut.cos.value = packed([cos for _, cos in self.held], self.w)
         dut.count.value = packed(self.counts, 32)
-        dut.setting_axis.value, dut.harmonic_enable.value, dut.learn.value = axis, enable, learn
-        self.word(words or {})
+        dut.setting_written.value, dut.harmonic_enable.value = strobes << 8 * axis, enable
+        dut.learn.value = learn
         await FallingEdge(dut.clk)
         samples = [(n in new, *self.held[n]) for n in range(self.axes)]
         want = self.model.step(samples, self.counts, axis, words, enable, learn, rst)
@@ -96,24 +96,25 @@ class Bench:
     def outputs(self):
         dut = self.dut
 
-        def strobed(strobe, *values):
-            if not int(strobe.value):
+        def strobed(strobes, *values, flag=None):
+            """(axis, values, flag) if one of the strobes is high."""
+            axes = [n for n in range(self.axes) if int(strobes.value) >> n & 1]
+            assert len(axes) <= 1 and (flag is None or int(flag.value) in (0, int(strobes.value)))
+            if not axes:
                 return None
-            return tuple(v.value.to_signed() if s else int(v.value) for v, s in values)
+            flags = () if flag is None else (int(int(flag.value) != 0),)
+            return (*axes, *(convert(value.value) for value, convert in values), *flags)
 
+        signed, plain = LogicArray.to_signed, LogicArray.to_unsigned
         return Outputs(
-            strobed(dut.served, (dut.served_axis, 0), (dut.served_sin, 1), (dut.served_cos, 1)),
             strobed(
                 dut.sampled,
-                (dut.sampled_axis, 0),
-                (dut.sampled_sin, 1),
-                (dut.sampled_cos, 1),
-                (dut.rejected, 0),
+                (dut.sampled_sin, signed),
+                (dut.sampled_cos, signed),
+                flag=dut.rejected,
             ),
-            strobed(dut.phase_valid, (dut.phase_axis, 0), (dut.plain_phase, 0)),
-            strobed(
-                dut.done, (dut.done_axis, 0), (dut.step, 1), (dut.phase, 0), (dut.overspeed, 0)
-            ),
+            strobed(dut.phase_valid, (dut.plain_phase, plain)),
+            strobed(dut.done, (dut.step, signed), (dut.phase, plain), flag=dut.overspeed),
             int(dut.disagreement.value),
             int(dut.overrun.value),
         )

@@ -64,7 +64,11 @@ class RegisterBlock:
         read = {
             f"{r.name}_read": int(self.awaited == r.word) for r in self.block.registers if r.on_read
         }
-        outputs = {f.port: self.value[f.port] for r, f in self.block.fields if f.kind == "setting"}
+        outputs = {
+            f.port: self.value[f.port]
+            for r, f in self.block.fields
+            if f.kind == "setting" and not f.passed
+        }
         return {"rdata": self.rdata, **outputs, **self.pulse, **read}
 
     def get(self, word):

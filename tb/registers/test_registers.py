@@ -212,9 +212,10 @@ async def strobes_last_one_clk(dut):
         assert (await bus.write(r.word, WORD ^ 1 << f.low))[f.port] == 0
     for r in (r for r in bus.block.registers if r.on_write):
         out = await bus.write(r.word + r.wide, 5 << min(f.low for f in r.fields))
+        held = 0 if r.fields[0].passed else 5 << 32 * r.wide
         assert (
             out[f"{r.name}_written"] == 1
-            and out[r.fields[0].port] == (5 << 32 * r.wide) * bus.there[r.fields[0]]
+            and out.get(r.fields[0].port, 0) == held * bus.there[r.fields[0]]
         )
         assert (await bus.clk())[f"{r.name}_written"] == 0
     for r in (r for r in bus.block.registers if r.on_read):
@@ -277,7 +278,7 @@ async def a_setting_whose_need_was_not_built_reads_zero_whatever_is_written(dut)
     bus = await Bus(dut).begin()
     for r, f in ((r, f) for r, f in bus.block.fields if not bus.there[f]):
         got = await bus.write(r.word, WORD)
-        assert got[f.port] == 0 and await bus.read(r.word) >> f.low & (1 << f.width) - 1 == 0
+        assert got.get(f.port, 0) == 0 and await bus.read(r.word) >> f.low & (1 << f.width) - 1 == 0
 
 
 def bench(name):

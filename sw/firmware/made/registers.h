@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x073ebd88u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x2c7f6456u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -1155,7 +1155,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_SIGNAL_FAULTS_MASK 0x00007fffu
 #define FEEDBACK_SIGNAL_FAULTS_SHIFT 0
 #define FEEDBACK_SIGNAL_FAULTS_WIDTH 15
-// r: signal faults that came first
+// r: first signal faults
 #define FEEDBACK_FIRST_SIGNAL_FAULTS 0x044u
 #define FEEDBACK_FIRST_SIGNAL_FAULTS_MASK 0x00007fffu
 #define FEEDBACK_FIRST_SIGNAL_FAULTS_SHIFT 0
@@ -1214,7 +1214,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_CAPTURE_SOURCES_WIDTH 7
 // rw: state of the captures; without HAS_CAPTURE there is one, of the index
 #define FEEDBACK_CAPTURE_STATE 0x064u
-// a capture waits in captured_*
+// capture waits in captured_*
 #define FEEDBACK_CAPTURE_STATE_PRESENT_MASK 0x00000001u
 #define FEEDBACK_CAPTURE_STATE_PRESENT_SHIFT 0
 #define FEEDBACK_CAPTURE_STATE_PRESENT_WIDTH 1

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x073EBD88  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x2C7F6456  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -1428,7 +1428,7 @@ FIELDS = (
         "feedback", "first_signal_faults", "value",
         0x44, 0, 15, False, "r", "",
         Fraction(1, 1),
-        "signal faults that came first",
+        "first signal faults",
     ),
     Field(
         "feedback", "signal_fault_mask", "value",
@@ -1507,7 +1507,7 @@ FIELDS = (
         "feedback", "capture_state", "present",
         0x64, 0, 1, False, "r", "",
         Fraction(1, 1),
-        "a capture waits in captured_*",
+        "capture waits in captured_*",
     ),
     Field(
         "feedback", "capture_state", "free",
