@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A node of three sine axes, of which the first two share an interpolation chain and the third has
+one of its own: each has its own correction, homes and moves, and a fault of one is not that of
+another.
+"""
+
+import random
+
+import pytest
+
+from figures import calibration as figures_calibration
+from moire.client.axis import CORRECTION
+from moire.client.bus import Bus
+from tb.bench import seed
+from tb.system.test_s0_correction import calibrated, left_nm
+from twin import Axis, Node, Twin, TwinTransport
+from twin.nodes.twin import drives
+
+FIRST, SECOND, OWN = range(3)
+NODE = {**drives("HAS_BRIDGE"), "FILTERS": 0, "HAS_OWN_CHAIN": 1 << OWN}
+NONE = {**dict.fromkeys(CORRECTION, 0), "gain": 65536, "cosine": [0] * 10, "sine": [0] * 10}
+
+assert calibrated  # the fixture
+
+
+@pytest.fixture
+def twin():
+    with Twin(
+        [Node(1, [Axis(), Axis(), Axis()])],
+        plant=figures_calibration.HARMONICS_OF_TWIN,
+        seed=seed() % 1000,
+        node_parameters=NODE,
+    ) as made:
+        yield made
+
+
+def axes_of(twin):
+    bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))
+    twin.run_until_ready()
+    return [bus.axis(1, n) for n in range(3)]
+
+
+def test_each_axis_has_a_correction_of_its_own(twin, calibrated):
+    axes = axes_of(twin)
+    corrections = {FIRST: NONE, SECOND: calibrated, OWN: calibrated}
+    left = {n: left_nm(twin.machine(n), axes[n], corrections[n]) for n in corrections}
+    assert left[FIRST] > 6 and left[SECOND] < 1 and left[OWN] < 1, left
+    left = {n: left_nm(twin.machine(n), axes[n], corrections[n]) for n in (FIRST, SECOND)}
+    assert left[FIRST] > 6 and left[SECOND] < 1, left
+
+
+def test_all_axes_home_and_move_at_once_and_a_fault_stays_with_its_axis(twin):
+    axes = axes_of(twin)
+    for axis in axes:
+        axis.enable()
+        assert axis.home().homed
+    for n, axis in enumerate(axes):
+        axis.begin_move(f"{20 + 10 * n}um")
+    for n, axis in enumerate(axes):
+        ended = axis.wait()
+        assert ended.ended == "ok" and not ended.faults
+        assert abs(ended.position_nm - (20 + 10 * n) * 1000) < 1000
+    twin.set_plant(FIRST, amplitude=0.05)
+    twin.run(0.1)
+    assert [bool(axis.status().faults) for axis in axes] == [True, False, False]
