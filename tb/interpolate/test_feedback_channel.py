@@ -3,13 +3,19 @@
 are tested one by one, their work together in motion in tb/system.
 """
 
+import math
+
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
+from tables import registers
 from tb.bench import run, start
 from tb.interpolate.feedback_inputs import INPUTS, SETTINGS
 
+BLOCK = next(block for block in registers.read() if block.name == "feedback")
+WORDS = {register.name: register.word for register in BLOCK.registers}
+STROBES = {f.name: 1 << f.low for r, f in BLOCK.fields if r.name == "strobes"}
 LATENCY = 22  # cycles from an ADC word to its position; 1 more with a segment table
 
 
@@ -42,6 +48,40 @@ async def latency_is_22_from_an_adc_word_to_position_and_23_with_a_segment_table
             abs(dut.position.value.to_signed() - eighths * 8192) < 50
         )  # the ends of 8 bits are 127 and -128
         assert int(dut.phase.value) == dut.position.value.to_unsigned() % 65536
+
+
+async def write(dut, name, value):
+    """Write a register of the channel."""
+    dut.select.value, dut.write.value, dut.word.value, dut.wdata.value = 1, 1, WORDS[name], value
+    await FallingEdge(dut.clk)
+    dut.select.value = dut.write.value = 0
+    dut.wdata.value = 0xFFFF_FFFF  # of another access
+
+
+async def phase(dut):
+    await converted(dut)
+    for _ in range(LATENCY + 2):
+        await FallingEdge(dut.clk)
+    return int(dut.phase.value)
+
+
+@cocotb.test()
+async def correction_and_harmonics_that_are_written_over_the_bus_act_from_their_strobe_on(dut):
+    await start(dut, **SETTINGS, **INPUTS)
+    await FallingEdge(dut.clk)
+    dut.adc_cos.value = 1
+    plain = await phase(dut)
+    assert abs(plain - 8192) < 50
+    for point in range(256):
+        await write(dut, "harmonic_point", point << 18 | 1600)
+    await write(dut, "correction_offset", 0x4000 << 16)  # half of the cosine
+    assert await phase(dut) == plain
+    await write(dut, "strobes", STROBES["swap_harmonics"])
+    assert await phase(dut) == plain - 100
+    await write(dut, "strobes", STROBES["load_correction"])
+    assert abs(await phase(dut) - (math.atan2(127, 63) / math.tau * 65536 - 100)) < 50
+    await write(dut, "harmonic_enable", 0)
+    assert abs(await phase(dut) - math.atan2(127, 63) / math.tau * 65536) < 50
 
 
 @cocotb.test()
