@@ -396,7 +396,7 @@ module feedback_channel #(
         end else begin : g_no_monitor
             assign {amplitude, signal_faults, first_signal_faults} = '0;
 
-            wire unused_axis = &{1'b0, amplitude_low, amplitude_high};
+            wire unused_axis = &{1'b0, amplitude_low, amplitude_high, sampled};
             wire unused_limits = &{
                 1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
                 offset_limit, balance_limit, quadrature_limit, clear_signal_faults, levels[1:0]
@@ -427,7 +427,8 @@ module feedback_channel #(
             );
         end else begin : g_no_recorder
             assign {recorded, full, invalid} = '0;
-            wire unused = &{1'b0, record, phases, decimation, recorder_read, disturbed};
+            wire unused_settings = &{1'b0, record, phases, decimation, recorder_read};
+            wire unused_signals = &{1'b0, disturbed, phase_valid, plain_phase};
         end
     end else begin : g_no_sine
         assign {adc_cs_n, adc_sclk} = 2'b11;
