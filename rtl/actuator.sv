@@ -3,7 +3,7 @@
 // stepper driver or a DAC, with a fine stage that uses the DAC.
 //
 // latency  see bridge_pwm, step_generator, spi_dac and fine_stage
-// rate     one command per tick, a tick at least 61 cycles after the one before
+// rate     one command per tick, a tick at least 53 cycles after the one before
 // behaviour  The pins of a drive that is not built are idle.
 // source   S0: DC motor by PWM, piezo on top; S2: stepper; S3: current amplifier behind a DAC of 16
 //          bits
@@ -19,40 +19,44 @@ module actuator #(
     input  wire               clk,
     input  wire               rst,
     // register bus
-    input  wire               select,           // strobe: an access to this actuator
-    input  wire               write,            // level: the access writes
-    input  wire        [ 5:0] word,             // 32-bit word of the block
-    input  wire        [31:0] wdata,            // value to write
-    input  wire        [31:0] wdata_low,        // low word of a value of 64 bits
-    output logic       [31:0] rdata,            // live bits read, in the next cycle; else 0
-    // time
-    input  wire               tick,             // strobe: servo tick
-    input  wire        [23:0] tick_period,      // cycles
+    input  wire               select,          // strobe: an access to this actuator
+    input  wire               write,           // level: the access writes
+    input  wire        [ 5:0] word,            // 32-bit word of the block
+    input  wire        [31:0] wdata,           // value to write
+    output logic       [31:0] rdata,           // live bits read, in the next cycle; else 0
     // permission
-    input  wire               enable,           // level: the interlock allows the drive
-    input  wire               fine,             // level: the fine stage holds the position
-    input  wire               rebase,           // strobe: the target jumps, do not follow it
-    input  wire               block_up,         // level: the interlock blocks motion up
-    input  wire               block_down,       // level: the interlock blocks motion down
+    input  wire               enable,          // level: the interlock allows the drive
+    input  wire               fine,            // level: the fine stage holds the position
+    input  wire               block_up,        // level: the interlock blocks motion up
+    input  wire               block_down,      // level: the interlock blocks motion down
     // motion
-    input  wire               valid,            // strobe: command is new
-    input  wire signed [15:0] command,          // full scale 2^15
-    input  wire signed [47:0] target,           // 2^-16 period
-    input  wire signed [31:0] target_velocity,  // 2^-16 period/tick
-    input  wire               moving,           // level: a profile is being played
-    input  wire signed [47:0] position,         // 2^-16 period
+    input  wire               valid,           // strobe: command is new
+    input  wire signed [15:0] command,         // full scale 2^15
+    input  wire signed [47:0] target,          // 2^-16 period
+    input  wire               line_up,         // level: the target of the line moved up
+    input  wire               line_down,       // level: the target of the line moved down
+    // lines of motor steps
+    input  wire               line_start,      // strobe: the lines begin
+    input  wire               line_idle,       // level: the lines have ended
+    input  wire               rate_valid,      // strobe: the rate of the next line is new
+    input  wire signed [36:0] rate,            // 2^-36 motor step per cycle, with rate_valid
+    input  wire               rate_restart,    // level: that line begins at a whole step
+    input  wire               rate_steep,      // level: that line is too steep
+    output logic              line_stopped,    // level: no line is followed until a restart
+    input  wire               compared,        // strobe: target of this tick is known
+    input  wire signed [47:0] position,        // 2^-16 period
     // pins
-    output logic              bridge_a,         // pin, alone high for a positive command
-    output logic              bridge_b,         // pin, alone high for a negative command
-    output logic              step,             // pin, as step_output_mode says
-    output logic              direction,        // pin, as step_output_mode says
-    output logic              dac_cs_n,         // pin, low during a word
-    output logic              dac_sclk,         // pin, idles low
-    output logic              dac_sdi,          // pin, data of the DAC
+    output logic              bridge_a,        // pin, alone high for a positive command
+    output logic              bridge_b,        // pin, alone high for a negative command
+    output logic              step,            // pin, as step_output_mode says
+    output logic              direction,       // pin, as step_output_mode says
+    output logic              dac_cs_n,        // pin, low during a word
+    output logic              dac_sclk,        // pin, idles low
+    output logic              dac_sdi,         // pin, data of the DAC
     // state
-    output logic              downward,         // level: the next step goes down
-    output logic              fine_saturated,   // level: the fine stage is at its limit
-    output logic              step_overrun      // level: too many steps are overdue
+    output logic              downward,        // level: the next step goes down
+    output logic              fine_saturated,  // level: the fine stage is at its limit
+    output logic              step_overrun     // level: too many steps are overdue
 );
     if (HAS_BRIDGE + HAS_STEPPER + HAS_DAC == 0) begin : g_check_drives
         AN_ACTUATOR_NEEDS_A_DRIVE u_error ();
@@ -71,8 +75,6 @@ module actuator #(
     wire        [ 1:0] mode;
     wire [13:0] high_cycles, low_cycles, setup_cycles, hold_cycles;
     wire step_low, direction_low;
-    wire        [ 3:0] trim_shift;
-    wire signed [47:0] step_ratio;
     wire signed [31:0] steps;
     // DAC
     wire        [ 7:0] half_period;
@@ -121,43 +123,21 @@ module actuator #(
     end
 
     if (HAS_STEPPER != 0) begin : g_stepper
-        wire go, restart, driven, allowed;
-        wire signed [47:0] step_target;
+        wire allowed;
 
         step_permission u_permission (
             .enable,
-            .by_steps(stepper_selected),
+            .by_steps   (stepper_selected),
             .block_up,
             .block_down,
-            .target_velocity,
-            .driven,
+            .target_up  (line_up),
+            .target_down(line_down),
             .allowed
         );
-        step_follower u_follower (
+        step_generator u_steps (
             .clk,
             .rst,
             // settings
-            .ratio   (step_ratio),
-            .shift   (trim_shift),
-            // permission
-            .enable  (driven),
-            .rebase,
-            // motion
-            .tick,
-            .target,
-            .trim    (command),
-            // steps
-            .go,
-            .restart,
-            .position(step_target)
-        );
-        step_generator #(
-            .PERIOD_W(18)
-        ) u_steps (
-            .clk,
-            .rst,
-            // settings
-            .period (tick_period[17:0]),
             .high_cycles,
             .low_cycles,
             .setup_cycles,
@@ -165,24 +145,30 @@ module actuator #(
             .mode,
             .step_low,
             .direction_low,
-            // target
+            // lines
             .enable (allowed),
-            .load   (restart),
-            .tick   (go),
-            .target (step_target),
+            .line_start,
+            .line_idle,
+            .rate_valid,
+            .rate,
+            .rate_restart,
+            .rate_steep,
+            .stopped(line_stopped),
             // pins and state
             .step,
             .direction,
             .steps,
             .overrun(step_overrun)
         );
-
-        wire unused = &{1'b0, tick_period[23:18]};
     end else begin : g_no_stepper
         assign {step, direction, step_overrun, steps} = '0;
-        wire unused_motion = &{1'b0, tick_period, rebase, block_up, block_down, target_velocity};
+        assign line_stopped = 1'b1;
+        wire unused_motion = &{1'b0, block_up, block_down, line_up, line_down};
+        wire unused_lines = &{
+            1'b0, line_start, line_idle, rate_valid, rate, rate_restart, rate_steep
+        };
         wire unused_times = &{1'b0, high_cycles, low_cycles, setup_cycles, hold_cycles};
-        wire unused_settings = &{1'b0, mode, step_low, step_ratio, trim_shift, stepper_selected};
+        wire unused_settings = &{1'b0, mode, step_low, stepper_selected};
     end
 
     if (HAS_FINE_STAGE != 0) begin : g_fine
@@ -198,9 +184,8 @@ module actuator #(
             .limit        (fine_limit),
             .gains_changed(fine_kp_written),
             // motion
-            .tick,
+            .tick         (compared),
             .target,
-            .moving,
             .position,
             // command
             .valid        (fine_valid),
@@ -210,7 +195,7 @@ module actuator #(
     end else begin : g_no_fine
         assign {fine_valid, fine_command, fine_saturated} = '0;
         wire unused_settings = &{1'b0, fine, fine_kp, fine_ki, fine_limit, fine_kp_written};
-        wire unused_motion = &{1'b0, tick, target, moving, position};
+        wire unused_motion = &{1'b0, compared, target, position};
     end
 
     if (HAS_DAC != 0) begin : g_dac
@@ -253,7 +238,6 @@ module actuator #(
         .write,
         .word,
         .wdata,
-        .wdata_low,
         .rdata,
         // which drive
         .drive                    (kind),
@@ -267,8 +251,6 @@ module actuator #(
         .step_output_mode         (mode),
         .step_output_step_low     (step_low),
         .step_output_direction_low(direction_low),
-        .step_output_trim         (trim_shift),
-        .step_ratio,
         .steps,
         // DAC
         .dac_half_period          (half_period),

@@ -2,21 +2,21 @@
 // axis -- one machine axis from the pins of its scale to the pins of its motor, behind three
 // register blocks.
 //
-// latency  22 cycles from an ADC word to position, 23 with a segment table; with a shared chain as in
-//          feedback_channel; from position to
-//          command within one servo tick
+// latency  22 cycles from an ADC word to position, 23 with a segment table; with a shared chain as
+//          in feedback_channel; from position at a tick to command as motion_engine has it, from
+//          target to motor steps one tick
 // rate     one sample per `sample_tick`, one command per `tick`
 // behaviour  Each HAS_... parameter builds one feature. What is not built has no logic, its pins
 //          are idle, and the registers of its settings and its state read 0. `built` shows what
-//          there is. An axis without a drive (HAS_DRIVE = 0) only measures: it has no profile,
-//          servo, interlock and actuator, and drive_enable is low.
+//          there is. An axis without a drive (HAS_DRIVE = 0) only measures: it has no interlock and
+//          no actuator, and drive_enable is low. Profile, servo and velocity of all axes of a node
+//          are in its motion_engine.
 // source   S0: interferometer with sine, cosine and comparator outputs, limit switches, DC motor;
 //          S2, S3: A/B/Z scales, stepper, linear motor
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
 
 module axis #(
-    parameter int CLK_HZ = 4_000_000,  // Hz, clk frequency
     parameter int W = 8,  // bits of a sample
     parameter int SEGMENTS = 0,  // most segments of the scale's table; 0: no table
     parameter int HAS_SINE = 1,  // 0: no sine and cosine, positions of counts only
@@ -26,8 +26,9 @@ module axis #(
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder of bursts, likewise
     parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
     parameter int HAS_COMPARE = 1,  // 1: build compare
-    parameter int HAS_VELOCITY = 1,  // 1: build the velocity estimator
-    parameter int HAS_DRIVE = 1,  // 1: build profile, servo, interlock, actuator; needs velocity
+    parameter int HAS_ENCODER_CHECK = 1,  // 1: build the check of the encoder
+    parameter int HAS_VELOCITY = 1,  // 1: the engine estimates the velocity
+    parameter int HAS_DRIVE = 1,  // 1: profile, servo, interlock, actuator; needs velocity
     parameter int FILTERS = 2 * HAS_DRIVE,  // biquads of the servo, 0 to 4
     parameter int HAS_BRIDGE = HAS_DRIVE,  // 1: build the bridge
     parameter int HAS_STEPPER = HAS_DRIVE,  // 1: build the step generator
@@ -49,15 +50,45 @@ module axis #(
     output logic [31:0] actuator_rdata,  // live bits read, in the next cycle; else 0
     // time
     input wire tick,  // strobe: servo tick
-    input wire [23:0] tick_period,  // cycles
     input wire sample_tick,  // strobe: take a sample
+    input wire limit_tick,  // strobe: an eighth of the time of a limit switch
     input wire [31:0] now,  // cycles, time stamp
     // node
     input wire start,  // strobe: play the queued segments, with other axes
+    input wire servo_overrun,  // strobe: a servo tick came too soon
     input wire sync,  // strobe: the sync pulse of the bus captures
     input wire estop,  // level: 1 pressed
     input wire watchdog_expired,  // level: the master of the bus is silent
     input wire cpu_stopped,  // level: the soft core has stopped or hangs
+    // motion_engine: what it is given
+    output logic [47:0] position,  // 2^-16 period
+    output logic step_made,  // strobe: position moves in the next cycle
+    output logic step_down,  // level: with step_made, it goes down
+    output logic moves,  // level: position will jump
+    output logic moved,  // strobe: position jumps by moved_by in the next cycle
+    output logic [47:0] moved_by,  // 2^-16 period, signed
+    output logic block_up,  // level: no positive command passes
+    output logic block_down,  // level: no negative command passes
+    output logic closed_loop,  // level: the servo commands the drive
+    output logic play,  // strobe: play the queued segments
+    output logic arm,  // strobe: play them at start_at
+    output logic controlled_stop,  // strobe: stop, and empty the queue
+    output logic hold_target,  // strobe: target := position
+    // motion_engine: its results
+    input wire waits,  // level: a request is not done yet
+    output logic pending,  // level: a request is not done and shown
+    input wire result_valid,  // strobe: result is new, and of this axis
+    input wire [2:0] result_kind,  // number of what it is
+    input wire [47:0] result,  // value, signed
+    input wire result_flag,  // level: its flag
+    // step_lines
+    input wire line_start,  // strobe: the lines of motor steps begin
+    input wire line_idle,  // level: the lines have ended
+    input wire rate_valid,  // strobe: the rate of the next line of this axis is new
+    input wire [36:0] rate,  // 2^-36 motor step per cycle, signed, with rate_valid
+    input wire rate_restart,  // level: that line begins at a whole step
+    input wire rate_steep,  // level: that line is too steep
+    output logic line_stopped,  // level: no line is followed until a restart
     // pins of the scale
     input wire encoder_a,  // pin
     input wire encoder_b,  // pin
@@ -114,34 +145,15 @@ module axis #(
     end
 
     // requests
-    wire control_enable, control_closed_loop, control_homing, control_fine;
-    wire strobes_reset_faults, strobes_set_target_to_position, strobes_start;
-    wire strobes_controlled_stop, strobes_arm;
+    wire control_enable, control_homing, control_fine;
+    wire strobes_reset_faults, strobes_start;
     // settings of the feedback channel
-    wire [15:0] deglitch, amplitude_low, amplitude_high;
+    wire [5:0] deglitch;
+    wire [15:0] amplitude_low, amplitude_high;
     wire sensing_written, disagreement_limit_written;
     wire        [ 5:0] encoder_fault_mask;
     wire signed [31:0] shift_origin;
     wire               shift_origin_written;
-    // settings of the profile
-    wire signed [63:0] segment_velocity, segment_acceleration;
-    wire signed [31:0] segment_jerk;
-    wire        [23:0] segment_ticks;
-    wire segment_ticks_written, segment_last;
-    wire [31:0] stop_deceleration, stop_jerk, start_at;
-    wire [31:0] feed_override_slope, feed_override_curve;
-    wire [16:0] feed_override_fraction;
-    wire        feed_override_pause;
-    // settings of the servo
-    wire [23:0] kp, ki, kd, kv, ka;
-    wire kp_written, kd_written, kv_written, ka_written;
-    wire [14:0] output_limit, integral_limit;
-    wire        [15:0] dead_band;
-    wire signed [15:0] open_command;
-    wire        [ 3:0] filters_in_use;
-    wire        [ 4:0] filters_address;
-    wire signed [31:0] filter_coefficient;
-    wire               filter_coefficient_written;
 
     // levels of the pins
     wire a, b, z, limit_low, limit_high, drive_fault;
@@ -149,27 +161,24 @@ module axis #(
     // measuring path
     wire signed [W-1:0] sin, cos;
     wire [15:0] phase, amplitude;
-    wire signed [31:0] velocity;
-    wire        [ 5:0] encoder_events;
-    wire signed [47:0] position, moved_by;
-    wire sample_rejected, pulse_rejected, encoder_fault, position_valid, moved, zero_up, zero_down;
+    wire [5:0] encoder_events;
+    wire sample_rejected, pulse_rejected, encoder_fault, position_valid, zero_up, zero_down;
     // target and command
     wire signed [47:0] target;
-    wire signed [31:0] error;
-    wire signed [15:0] command;
-    wire        [ 4:0] queue_free;
-    wire moving, armed, saturated;
+    wire signed [31:0] velocity, error;
+    wire signed [15:0] command, servo_command;
+    wire [4:0] queue_free;
+    wire moving, armed, saturated, line_up, line_down, underrun;
+    wire compared, too_far, commanded;
     // interlock and drive
-    wire [31:0] following_limit;
-    wire [9:0] faults, causes_now, first_fault;
+    wire [10:0] faults, causes_now, first_fault;
     wire signed [47:0] fault_position;
     wire downward, fine_saturated;
 
-    axis_inputs #(
-        .CLK_HZ(CLK_HZ)
-    ) u_inputs (
+    axis_inputs u_inputs (
         .clk,
         .rst,
+        .limit_tick,
         // pins
         .encoder_a,
         .encoder_b,
@@ -188,16 +197,16 @@ module axis #(
         .drive_fault
     );
     feedback_channel #(
-        .W            (W),
-        .SEGMENTS     (SEGMENTS),
-        .HAS_SINE     (HAS_SINE),
-        .HAS_OWN_CHAIN(HAS_OWN_CHAIN),
-        .HAS_MONITOR  (HAS_MONITOR),
-        .HAS_HARMONICS(HAS_HARMONICS),
-        .HAS_RECORDER (HAS_RECORDER),
-        .HAS_CAPTURE  (HAS_CAPTURE),
-        .HAS_COMPARE  (HAS_COMPARE),
-        .HAS_VELOCITY (HAS_VELOCITY)
+        .W                (W),
+        .SEGMENTS         (SEGMENTS),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_OWN_CHAIN    (HAS_OWN_CHAIN),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_CAPTURE      (HAS_CAPTURE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK)
     ) u_feedback (
         .clk,
         .rst,
@@ -270,7 +279,37 @@ module axis #(
         .position,
         .moved,
         .moved_by,
-        .velocity
+        .moves,
+        .step_made,
+        .step_down
+    );
+    engine_outputs u_outputs (
+        .clk,
+        .rst,
+        // motion_engine
+        .valid        (result_valid),
+        .kind         (result_kind),
+        .result,
+        .flag         (result_flag),
+        .waits,
+        .line_start,
+        // the profile
+        .moving,
+        .armed,
+        .queue_free,
+        .pending,
+        .target,
+        .line_up,
+        .line_down,
+        .underrun,
+        // the servo
+        .velocity,
+        .error,
+        .saturated,
+        .error_valid  (compared),
+        .too_far,
+        .command_valid(commanded),
+        .command      (servo_command)
     );
     zero_crossing u_zero (
         .clk,
@@ -283,108 +322,18 @@ module axis #(
     );
 
     if (HAS_DRIVE != 0) begin : g_drive
-        wire check_following, play, rebase, gains_changed;
-        wire signed [31:0] target_velocity, target_acceleration;
-        wire signed [15:0] servo_command;
-        wire underrun, commanded, passed, block_up, block_down, step_overrun;
+        wire check_following, passed, step_overrun;
 
         axis_requests u_requests (
             // levels
-            .closed_loop           (control_closed_loop),
-            .fine                  (control_fine),
+            .closed_loop (closed_loop),
+            .fine        (control_fine),
             // strobes
-            .start                 (strobes_start),
-            .common_start          (start),
-            .set_target_to_position(strobes_set_target_to_position),
-            .moved,
-            .kp_written,
-            .kd_written,
-            .kv_written,
-            .ka_written,
+            .start       (strobes_start),
+            .common_start(start),
             // joined
             .check_following,
-            .play,
-            .rebase,
-            .gains_changed
-        );
-
-        profile_player u_profile (
-            .clk,
-            .rst,
-            // settings
-            .stop_deceleration,
-            .stop_jerk,
-            .slope                 (feed_override_slope),
-            .curve                 (feed_override_curve),
-            .feed_fraction         (feed_override_fraction),
-            .pause                 (feed_override_pause),
-            // segments
-            .tick,
-            .push                  (segment_ticks_written),
-            .segment_velocity,
-            .segment_acceleration,
-            .segment_jerk,
-            .segment_ticks,
-            .segment_last,
-            // requests
-            .start                 (play),
-            .arm                   (strobes_arm),
-            .start_at,
-            .now,
-            .controlled_stop       (strobes_controlled_stop),
-            .set_target_to_position(strobes_set_target_to_position),
-            // position
-            .position,
-            .shift                 (moved),
-            .shift_by              (moved_by),
-            // target
-            .target,
-            .target_velocity,
-            .target_acceleration,
-            // state
-            .moving,
-            .armed,
-            .queue_free,
-            .underrun
-        );
-        pid_servo #(
-            .BIQUADS(FILTERS)
-        ) u_servo (
-            .clk,
-            .rst,
-            // settings
-            .closed_loop        (control_closed_loop),
-            .kp,
-            .ki,
-            .kd,
-            .kv,
-            .ka,
-            .output_limit,
-            .integral_limit,
-            .dead_band,
-            .gains_changed,
-            // filters
-            .filters_in_use,
-            .coefficient_write  (filter_coefficient_written),
-            .coefficient_address(filters_address),
-            .coefficient        (filter_coefficient),
-            // target
-            .tick,
-            .target,
-            .target_velocity,
-            .target_acceleration,
-            .moving,
-            // position
-            .position,
-            .velocity,
-            // command
-            .open_command,
-            .block_up,
-            .block_down,
-            .valid              (commanded),
-            .command            (servo_command),
-            .error,
-            .saturated
+            .play
         );
 
         drive_interlock u_interlock (
@@ -401,13 +350,13 @@ module axis #(
             .estop,
             .drive_fault,
             .encoder_fault,
-            .following_limit,
-            .error,
-            .error_valid     (commanded),
+            .error_valid     (compared),
+            .error_too_far   (too_far),
             .watchdog_expired,
             .cpu_trap        (cpu_stopped),
             .profile_underrun(underrun),
             .step_overrun,
+            .servo_overrun,
             // command
             .position,
             .valid_in        (commanded),
@@ -438,24 +387,28 @@ module axis #(
             .write,
             .word,
             .wdata,
-            .wdata_low,
             .rdata (actuator_rdata),
-            // time
-            .tick,
-            .tick_period,
             // permission
             .enable(drive_enable),
             .fine  (control_fine),
-            .rebase,
             .block_up,
             .block_down,
             // motion
             .valid (passed),
             .command,
             .target,
-            .target_velocity,
-            .moving,
+            .line_up,
+            .line_down,
+            .compared,
             .position,
+            // lines of motor steps
+            .line_start,
+            .line_idle,
+            .rate_valid,
+            .rate,
+            .rate_restart,
+            .rate_steep,
+            .line_stopped,
             // pins
             .bridge_a,
             .bridge_b,
@@ -470,40 +423,32 @@ module axis #(
             .step_overrun
         );
     end else begin : g_no_drive
-        assign {target, moving, armed, queue_free} = '0;
-        assign {command, error, saturated} = '0;
+        assign {command, play} = '0;
+        assign {block_up, block_down} = 2'b11;
         assign {drive_enable, faults, causes_now, first_fault, fault_position} = '0;
         assign {bridge_a, bridge_b, step, direction} = '0;
         assign {dac_cs_n, dac_sclk, dac_sdi} = 3'b100;
         assign {actuator_rdata, downward, fine_saturated} = '0;
+        assign line_stopped = 1'b1;
 
-        wire unused_bus = &{1'b0, actuator_select, tick_period, start};
+        wire unused_bus = &{1'b0, actuator_select, start};
         wire unused_requests = &{
-            1'b0, control_enable, control_closed_loop, control_homing, control_fine,
-            strobes_reset_faults, strobes_set_target_to_position, strobes_start,
-            strobes_controlled_stop, strobes_arm
+            1'b0, control_enable, control_homing, control_fine, strobes_reset_faults,
+            strobes_start
         };
         wire unused_causes = &{
             1'b0, estop, watchdog_expired, cpu_stopped, limit_low, limit_high, drive_fault,
-            encoder_fault, following_limit
+            encoder_fault, servo_overrun, underrun, too_far
         };
-        wire unused_profile = &{
-            1'b0, segment_velocity, segment_acceleration, segment_jerk, segment_ticks,
-            segment_ticks_written, segment_last, stop_deceleration, stop_jerk, start_at,
-            feed_override_slope, feed_override_curve, feed_override_fraction, feed_override_pause
+        wire unused_motion = &{
+            1'b0, line_up, line_down, compared, commanded, servo_command, line_idle, rate_valid,
+            rate, rate_restart, rate_steep
         };
-        wire unused_servo = &{
-            1'b0, kp, ki, kd, kv, ka, kp_written, kd_written, kv_written, ka_written,
-            output_limit, integral_limit, dead_band, open_command, filters_in_use,
-            filters_address, filter_coefficient, filter_coefficient_written
-        };
-        wire unused_motion = &{1'b0, moved_by};
     end
 
     axis_registers #(
         .HAS_MONITOR(HAS_MONITOR),
-        .HAS_DRIVE  (HAS_DRIVE),
-        .FILTERS    (FILTERS)
+        .HAS_DRIVE  (HAS_DRIVE)
     ) u_registers (
         .clk,
         .rst,
@@ -512,108 +457,76 @@ module axis #(
         .write,
         .word,
         .wdata,
-        .wdata_low,
         .rdata,
         // requests
         .control_enable,
-        .control_closed_loop,
+        .control_closed_loop           (closed_loop),
         .control_homing,
         .control_fine,
         .strobes_reset_faults,
-        .strobes_set_target_to_position,
+        .strobes_set_target_to_position(hold_target),
         .strobes_start,
-        .strobes_controlled_stop,
-        .strobes_arm,
+        .strobes_controlled_stop       (controlled_stop),
+        .strobes_arm                   (arm),
         // state
-        .state_enabled        (drive_enable),
-        .state_limit_low      (limit_low),
-        .state_limit_high     (limit_high),
-        .state_estop          (estop),
-        .state_drive_fault    (drive_fault),
-        .state_moving         (moving),
-        .state_saturated      (saturated),
-        .state_queue_free     (queue_free),
-        .state_armed          (armed),
-        .state_fine_saturated (fine_saturated),
+        .state_enabled                 (drive_enable),
+        .state_limit_low               (limit_low),
+        .state_limit_high              (limit_high),
+        .state_estop                   (estop),
+        .state_drive_fault             (drive_fault),
+        .state_moving                  (moving),
+        .state_saturated               (saturated),
+        .state_queue_free              (queue_free),
+        .state_armed                   (armed),
+        .state_fine_saturated          (fine_saturated),
         // what is built
-        .built_sine           (1'(HAS_SINE)),
-        .built_monitor        (1'(HAS_MONITOR)),
-        .built_harmonics      (1'(HAS_HARMONICS)),
-        .built_recorder       (1'(HAS_RECORDER)),
-        .built_capture        (1'(HAS_CAPTURE)),
-        .built_compare        (1'(HAS_COMPARE)),
-        .built_velocity       (1'(HAS_VELOCITY)),
-        .built_drive          (1'(HAS_DRIVE)),
-        .built_bridge         (1'(HAS_BRIDGE)),
-        .built_stepper        (1'(HAS_STEPPER)),
-        .built_dac            (1'(HAS_DAC)),
-        .built_fine_stage     (1'(HAS_FINE_STAGE)),
-        .built_filters        (3'(FILTERS)),
-        .built_segments       (8'(SEGMENTS)),
+        .built_sine                    (1'(HAS_SINE)),
+        .built_monitor                 (1'(HAS_MONITOR)),
+        .built_harmonics               (1'(HAS_HARMONICS)),
+        .built_recorder                (1'(HAS_RECORDER)),
+        .built_capture                 (1'(HAS_CAPTURE)),
+        .built_compare                 (1'(HAS_COMPARE)),
+        .built_encoder_check           (1'(HAS_ENCODER_CHECK)),
+        .built_velocity                (1'(HAS_VELOCITY)),
+        .built_drive                   (1'(HAS_DRIVE)),
+        .built_bridge                  (1'(HAS_BRIDGE)),
+        .built_stepper                 (1'(HAS_STEPPER)),
+        .built_dac                     (1'(HAS_DAC)),
+        .built_fine_stage              (1'(HAS_FINE_STAGE)),
+        .built_filters                 (3'(FILTERS)),
+        .built_segments                (8'(SEGMENTS)),
         // interlock
         .faults,
         .causes_now,
         .first_fault,
         .fault_position,
-        .following_limit,
         // position
         .position,
         .target,
         .velocity,
         .shift_origin,
         .shift_origin_written,
-        .zero_crossing_up     (zero_up),
-        .zero_crossing_down   (zero_down),
+        .zero_crossing_up              (zero_up),
+        .zero_crossing_down            (zero_down),
         // settings of the feedback channel
-        .sensing_deglitch     (deglitch),
+        .sensing_deglitch              (deglitch),
         .sensing_written,
-        .amplitude_window_low (amplitude_low),
-        .amplitude_window_high(amplitude_high),
+        .amplitude_window_low          (amplitude_low),
+        .amplitude_window_high         (amplitude_high),
         .disagreement_limit_written,
         // signals
-        .sample_sin           (16'(sin)),
-        .sample_cos           (16'(cos)),
-        .phase_phase          (phase),
-        .phase_amplitude      (amplitude),
+        .sample_sin                    (16'(sin)),
+        .sample_cos                    (16'(cos)),
+        .phase_phase                   (phase),
+        .phase_amplitude               (amplitude),
         .quadrature_count,
         .encoder_events,
         .encoder_fault_mask,
-        .rejected_pulses      (pulse_rejected),
-        .rejected_samples     (sample_rejected),
+        .rejected_pulses               (pulse_rejected),
+        .rejected_samples              (sample_rejected),
         // servo
-        .kp,
-        .kp_written,
-        .ki,
-        .kd,
-        .kd_written,
-        .kv,
-        .kv_written,
-        .ka,
-        .ka_written,
-        .servo_limits_output  (output_limit),
-        .servo_limits_integral(integral_limit),
-        .dead_band,
-        .following_error      (error),
-        .command,
-        .open_command,
-        .filters_in_use,
-        .filters_address,
-        .filter_coefficient,
-        .filter_coefficient_written,
-        // profile
-        .segment_velocity,
-        .segment_acceleration,
-        .segment_jerk,
-        .segment_ticks,
-        .segment_ticks_written,
-        .segment_ticks_last   (segment_last),
-        .stop_deceleration,
-        .stop_jerk,
-        .feed_override_fraction,
-        .feed_override_pause,
-        .feed_override_slope,
-        .feed_override_curve,
-        .start_at
+        .following_error               (error),
+        .command
     );
 endmodule
 

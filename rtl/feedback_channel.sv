@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// feedback_channel -- the measuring path of an axis: from the pins of a scale to position and
-// velocity.
+// feedback_channel -- the measuring path of an axis: from the pins of a scale to its position.
 //
 // latency  22 cycles from an ADC word to position with a chain of its own, 23 with a shared one and
-//          1 more for each axis that is served before; 5 cycles from the pins a and b to position in
-//          the mode of counts; 1 cycle more each with a segment table
-// rate     one sample per `sample_tick`, one velocity per `tick`
+//          1 more for each axis that is served before; 5 cycles from the pins a and b to position
+//          in the mode of counts; 1 cycle more each with a segment table
+// rate     one sample per `sample_tick`
 // behaviour  A feature that is not built has no logic, and the registers of its settings and its
-//          state read 0. Without HAS_OWN_CHAIN an interpolation_chain of the node computes the steps
-//          of several axes; the ports chain_... and sample_... connect it. Without HAS_CAPTURE only the index captures, one at a time, with its
-//          position alone: that is what homing needs.
+//          state read 0. Without HAS_OWN_CHAIN an interpolation_chain of the node computes the
+//          steps of several axes; the ports chain_... and sample_... connect it. Without
+//          HAS_CAPTURE only the index captures, one at a time, with its position alone: that is
+//          what homing needs. The check of the encoder is the check of counts per revolution, the
+//          count at the last index and the time of the last edge.
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
@@ -24,7 +25,7 @@ module feedback_channel #(
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder, likewise
     parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
     parameter int HAS_COMPARE = 1,  // 1: build compare
-    parameter int HAS_VELOCITY = 1  // 1: build the velocity estimator
+    parameter int HAS_ENCODER_CHECK = 1  // 1: build the check of the encoder
 ) (
     input wire clk,
     input wire rst,
@@ -41,7 +42,7 @@ module feedback_channel #(
     input wire sync,  // strobe: the sync pulse of the bus captures
     input wire [31:0] now,  // cycles, time stamp
     // settings of axis_registers
-    input wire [15:0] deglitch,  // cycles that a, b and z must be stable
+    input wire [5:0] deglitch,  // samples that a, b and z must be stable
     input wire [15:0] amplitude_low,  // ADC counts, smallest amplitude
     input wire [15:0] amplitude_high,  // ADC counts, largest amplitude
     input wire [5:0] encoder_fault_mask,  // which events are a fault, bits as in events
@@ -49,7 +50,7 @@ module feedback_channel #(
     input wire limit_written,  // strobe: limit of the count check
     // shift of the origin
     input wire shift,  // strobe: move the origin
-    input wire signed [31:0] shift_periods,  // period, distance of the shift
+    input wire signed [31:0] shift_periods,  // period, distance of the shift; else 0
     // pins
     input wire a,  // level of pin a, synchronous to clk
     input wire b,  // level of pin b, synchronous to clk
@@ -99,7 +100,9 @@ module feedback_channel #(
     output logic signed [47:0] position,  // 2^-16 period, less the segment error
     output logic moved,  // strobe: position will jump by moved_by
     output logic signed [47:0] moved_by,  // 2^-16 period, in the next cycle
-    output logic signed [31:0] velocity  // 2^-16 period/tick, of the scale itself
+    output logic moves,  // level: position will jump, with the table
+    output logic step_made,  // strobe: position moves in the next cycle
+    output logic step_down  // level: with step_made, it goes down
 );
     localparam int CAPTURE_DELAY = SEGMENTS == 0 ? 2 : 3;  // cycles from an index to its position
 
@@ -148,8 +151,7 @@ module feedback_channel #(
     wire phases, record, recorder_read;
     // settings of the position
     wire use_counts, own_steps, align_written;
-    wire signed [ 2:0] align;
-    wire        [15:0] quantum;
+    wire signed [2:0] align;
     // settings of the segment table
     wire segment_enable, segment_linear, segment_origin_written, segment_point_written;
     wire segment_read;
@@ -182,7 +184,6 @@ module feedback_channel #(
     wire signed [16:0] counted_step, step;
     wire [15:0] counted_phase, step_phase;
     wire signed [47:0] scale_position;
-    wire signed [39:0] velocity_fine;
     // segment table
     wire segment_in_force, segment_outside, segment_known, shifted;
     wire signed [31:0] shifted_periods;
@@ -196,7 +197,8 @@ module feedback_channel #(
     wire        [ 4:0] capture_free;
 
     incremental_encoder #(
-        .FILTER_W(16)
+        .FILTER_W(6),
+        .CHECK   (HAS_ENCODER_CHECK)
     ) u_encoder (
         .clk,
         .rst,
@@ -494,34 +496,25 @@ module feedback_channel #(
         .valid   (stepped),
         .step,
         .phase   (step_phase),
-        .shift,
         .shift_periods,
         // position of the scale
         .done    (scale_valid),
         .position(scale_position)
     );
-    if (HAS_VELOCITY != 0) begin : g_velocity
-        velocity_estimator u_velocity (
-            .clk,
-            .rst,
-            .quantum,
-            .tick,
-            // position of the scale
-            .position(scale_position),
-            .shift,
-            .shift_periods,
-            // velocity
-            .velocity,
-            .fine    (velocity_fine)
-        );
-    end else begin : g_no_velocity
-        assign {velocity, velocity_fine} = '0;
-        wire unused = &{1'b0, quantum};
-    end
-
+    step_events #(
+        .DELAY(SEGMENTS == 0 ? 0 : 1)
+    ) u_steps (
+        .clk,
+        .rst,
+        .valid   (stepped),
+        .step,
+        .stepped (step_made),
+        .downward(step_down)
+    );
     if (SEGMENTS != 0) begin : g_segments
         localparam int INDEX = $clog2(SEGMENTS + 1);
 
+        assign moves = segment_enable != segment_in_force;
         segment_correction #(
             .INDEX(INDEX)
         ) u_segments (
@@ -568,6 +561,7 @@ module feedback_channel #(
     end else begin : g_no_segments
         assign {position_valid, position} = {scale_valid, scale_position};
         assign {moved, moved_by} = {shift, shift_periods, 16'd0};
+        assign moves = 1'b0;
         assign {shifted, shifted_periods} = {shift, shift_periods};
         assign {segment_in_force, segment_outside, segment_known} = '0;
         assign {segment_error, segment_stored} = '0;
@@ -673,11 +667,11 @@ module feedback_channel #(
     end
 
     feedback_registers #(
-        .HAS_MONITOR  (HAS_MONITOR),
-        .HAS_HARMONICS(HAS_HARMONICS),
-        .HAS_RECORDER (HAS_RECORDER),
-        .HAS_COMPARE  (HAS_COMPARE),
-        .HAS_VELOCITY (HAS_VELOCITY)
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK)
     ) u_registers (
         .clk,
         .rst,
@@ -714,8 +708,8 @@ module feedback_channel #(
         .index_events_found                 (index_found),
         .index_events_revolution_wrong      (revolution_wrong),
         .index_events_armed                 (index_armed),
-        .index_count,
-        .edge_time,
+        .index_count                        (HAS_ENCODER_CHECK != 0 ? index_count : 32'sd0),
+        .edge_time                          (HAS_ENCODER_CHECK != 0 ? edge_time : 32'd0),
         // correction
         .correction_offset_written          (offset_written),
         .correction_gain_written            (gain_written),
@@ -761,9 +755,7 @@ module feedback_channel #(
         .compare_state_armed                (armed),
         .compare_state_late                 (late),
         .compare_passed                     (passed),
-        // velocity and source of the position
-        .velocity_quantum                   (quantum),
-        .velocity_fine,
+        // source of the position
         .position_source_counts             (use_counts),
         .position_source_steps              (own_steps),
         .align,

@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// node -- a complete motion controller on an RS-485 bus: soft core, bus port, axes and peripherals.
+// node -- a complete motion controller on an RS-485 bus: soft core, bus port, motion engine, axes
+// and peripherals.
 //
 // latency  see the blocks
 // rate     see the blocks
 // behaviour  The HAS_... parameters of axes are masks: bit n builds the feature in axis n, and bits
-//          from AXES up are ignored, so 255 means all axes and 0 none. FILTERS and SEGMENTS are
-//          sizes, for the axes whose bit is set in HAS_FILTERS or HAS_SEGMENTS. A mask that is not
-//          given equals the mask that it needs. A feature without what it needs stops the build,
-//          with the rule as the message.
+//            from AXES up are ignored, so 255 means all axes and 0 none. FILTERS and SEGMENTS are
+//            sizes, for the axes whose bit is set in HAS_FILTERS or HAS_SEGMENTS. A mask that is
+//            not given equals the mask that it needs. A feature without what it needs stops the
+//            build, with the rule as the message, and so do more axes and filters than
+//            motion_engine can serve in the cycles of a servo tick, CLK_HZ / TICK_HZ.
 // source   S0: one slave computer per axis, many on one bus; here one node may have several axes
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
 
 module node #(
     parameter int CLK_HZ = 4_000_000,  // Hz, clk frequency
+    parameter int TICK_HZ = 4000,  // Hz, servo tick that the firmware sets
     parameter int AXES = 1,  // axes of the node, 1 to 8
     parameter int W = 8,  // bits of a sample
     parameter int FILTERS = 2,  // biquads of a servo, 0 to 4
@@ -21,14 +24,15 @@ module node #(
     parameter int HAS_SINE = 255,  // axes with sine and cosine; else counts only
     // axes with an interpolation chain of their own, the other sine axes share one; by default a
     // single sine axis has its own
-    parameter int HAS_OWN_CHAIN     = ((HAS_SINE % (1 << AXES)) & ((HAS_SINE % (1 << AXES)) - 1)) == 0 ? 255 : 0,
+    parameter int HAS_OWN_CHAIN = (HAS_SINE & (HAS_SINE - 1)) % (1 << AXES) == 0 ? 255 : 0,
     parameter int HAS_MONITOR = HAS_SINE,  // axes with a signal monitor, needs the sine
     parameter int HAS_HARMONICS = HAS_SINE,  // axes with harmonic correction, needs the sine
     parameter int HAS_RECORDER = HAS_SINE,  // axes with a recorder of bursts, needs the sine
     parameter int HAS_SEGMENTS = 255,  // axes with a table of SEGMENTS segments
     parameter int HAS_CAPTURE = 255,  // axes with a queue of captures
     parameter int HAS_COMPARE = 255,  // axes with compare
-    parameter int HAS_VELOCITY = 255,  // axes with a velocity estimator
+    parameter int HAS_ENCODER_CHECK = 255,  // axes with the check of the encoder
+    parameter int HAS_VELOCITY = 255,  // axes of which the engine has the velocity
     parameter int HAS_DRIVE = 255,  // axes with a drive; the others only measure
     parameter int HAS_FILTERS = HAS_DRIVE,  // axes with FILTERS biquads, needs the drive
     parameter int HAS_BRIDGE = HAS_DRIVE,  // axes with a bridge, needs the drive
@@ -100,24 +104,41 @@ module node #(
     output logic              display_data,         // pin
     input  wire  [       1:0] edm_status            // pins, asynchronous
 );
+    localparam int LIMIT_PERIOD = CLK_HZ / 80_000;  // cycles
+    localparam [2:0] STEPS = 3'd6;  // kind of result, as in tables/engine_microcode.py
+    localparam int SERVO_FILTERS = HAS_FILTERS % (1 << AXES) != 0 ? FILTERS : 0;
+
     // register bus
     wire select, write, node_select, bus_select, peripherals_select;
     wire [AXES-1:0] axis_select, feedback_select, actuator_select;
     wire [15:0] bus_address;
     wire [31:0] wdata, wdata_low, rdata;
     wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata;
-    wire registers_ready;
+    wire memory_ready, stores, hold, engine_waits;
+    wire [13:0] stored_at;
+    wire [31:0] stored_value;
     wire [32*AXES-1:0] axis_rdata, feedback_rdata, actuator_rdata;
     wire [ 5:0] word = bus_address[7:2];
     // time
     wire [63:0] now;
     wire [23:0] tick_period;
     wire [15:0] sample_period;
-    wire tick, sample_tick, restart_tick;
+    wire tick, sample_tick, limit_tick, restart_tick;
     // start of several axes
     wire start_axes_written, sync;
     wire [7:0] start_axes, sync_axes;
     wire [AXES-1:0] start;
+    // motion engine
+    wire [48*AXES-1:0] position, moved_by;
+    wire [AXES-1:0] step_made, step_down, moves, moved, block_up, block_down, closed_loop;
+    wire [AXES-1:0] play, arm, controlled_stop, hold_target, request_waits, pending;
+    wire result_valid, result_flag, servo_overrun;
+    wire [2:0] result_axis, result_kind;
+    wire [47:0] result;
+    // lines of motor steps
+    wire line_start, line_idle, rate_restart, rate_steep;
+    wire [AXES-1:0] rate_valid, line_stopped;
+    wire signed [36:0] rate;
     // interpolation chain that sine axes share
     localparam int SHARED = HAS_SINE % (1 << AXES) & ~HAS_OWN_CHAIN;
     wire [8*AXES-1:0] chain_setting_written;
@@ -138,7 +159,7 @@ module node #(
     ) u_core (
         .clk,
         .rst,
-        .ready  (registers_ready),
+        .ready  (memory_ready && !engine_waits),
         .select,
         .write,
         .address(bus_address),
@@ -147,29 +168,34 @@ module node #(
         .trap
     );
     register_memory #(
-        .AXES          (AXES),
-        .FILTERS       (FILTERS == 0 ? 0 : HAS_FILTERS),
-        .HAS_BRIDGE    (HAS_BRIDGE),
-        .HAS_COMPARE   (HAS_COMPARE),
-        .HAS_DAC       (HAS_DAC),
-        .HAS_DRIVE     (HAS_DRIVE),
-        .HAS_FINE_STAGE(HAS_FINE_STAGE),
-        .HAS_HARMONICS (HAS_HARMONICS),
-        .HAS_MONITOR   (HAS_MONITOR),
-        .HAS_RECORDER  (HAS_RECORDER),
-        .HAS_SINE      (HAS_SINE),
-        .HAS_STEPPER   (HAS_STEPPER),
-        .HAS_VELOCITY  (HAS_VELOCITY)
+        .AXES             (AXES),
+        .FILTERS          (FILTERS == 0 ? 0 : HAS_FILTERS),
+        .HAS_BRIDGE       (HAS_BRIDGE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_DAC          (HAS_DAC),
+        .HAS_DRIVE        (HAS_DRIVE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_STEPPER      (HAS_STEPPER),
+        .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_register_memory (
         .clk,
         .rst,
+        .hold,
         .select,
         .write,
         .address(bus_address[15:2]),
         .wdata,
-        .ready  (registers_ready),
+        .ready  (memory_ready),
         .rdata  (memory_rdata),
-        .wdata_low
+        .wdata_low,
+        .stores,
+        .stored_at,
+        .stored_value
     );
     register_bus #(
         .AXES(AXES)
@@ -243,6 +269,16 @@ module node #(
         .restart(1'b0),
         .tick   (sample_tick)
     );
+    // a limit switch must be stable for 0.1 ms
+    tick_divider #(
+        .W($clog2(LIMIT_PERIOD + 1))
+    ) u_limit_tick (
+        .clk,
+        .rst,
+        .period ($clog2(LIMIT_PERIOD + 1)'(LIMIT_PERIOD)),
+        .restart(1'b0),
+        .tick   (limit_tick)
+    );
     common_start #(
         .AXES(AXES)
     ) u_start (
@@ -253,6 +289,107 @@ module node #(
         .start,
         .restart_tick
     );
+
+    if (HAS_VELOCITY % (1 << AXES) != 0) begin : g_engine
+        wire ready, setting_write, setting_waits;
+        wire        [ 2:0] setting_axis;
+        wire        [ 6:0] setting_word;
+        wire        [ 1:0] setting_filter;
+        wire signed [63:0] setting;
+        wire [AXES-1:0] gains_changed, push;
+        wire signed [47:0] shift_by;
+        wire               busy;
+        wire        [15:0] cycles;
+
+        engine_bus #(
+            .AXES   (AXES),
+            .FILTERS(SERVO_FILTERS)
+        ) u_bus (
+            .clk,
+            .rst,
+            // register memory
+            .stores,
+            .address  (stored_at),
+            .value    (stored_value),
+            .value_low(wdata_low),
+            .hold,
+            .waits    (engine_waits),
+            // settings
+            .ready,
+            .setting_waits,
+            .setting_write,
+            .setting_axis,
+            .setting_word,
+            .setting_filter,
+            .setting,
+            // requests
+            .gains_changed,
+            .push,
+            .pending,
+            .moves,
+            .moved,
+            .moved_by,
+            .shift_by
+        );
+        motion_engine #(
+            .AXES       (AXES),
+            .FILTERS    (SERVO_FILTERS),
+            .TICK_CYCLES(CLK_HZ / TICK_HZ)
+        ) u_engine (
+            .clk,
+            .rst,
+            .tick,
+            .now                   (now[31:0]),
+            // settings
+            .setting_write,
+            .setting_axis,
+            .setting_word,
+            .setting_filter,
+            .setting,
+            .setting_waits,
+            // the axes
+            .position,
+            .stepped               (step_made),
+            .downward              (step_down),
+            .block_up,
+            .block_down,
+            .closed_loop,
+            // requests
+            .start                 (play),
+            .arm,
+            .controlled_stop,
+            .set_target_to_position(hold_target),
+            .push,
+            .gains_changed,
+            .shift                 (moved),
+            .shift_by,
+            .waits                 (request_waits),
+            // results
+            .result_valid,
+            .result_axis,
+            .result_kind,
+            .result,
+            .result_flag,
+            // schedule
+            .ready,
+            .busy,
+            .overrun               (servo_overrun),
+            .cycles
+        );
+
+        wire unused = &{1'b0, busy, cycles};
+    end else begin : g_no_engine
+        assign {hold, engine_waits, request_waits} = '0;
+        assign {result_valid, result_axis, result_kind, result, result_flag} = '0;
+        assign servo_overrun = 1'b0;
+
+        wire unused_registers = &{1'b0, stores, stored_at, stored_value};
+        wire unused_axes = &{
+            1'b0, position, step_made, step_down, moves, moved, moved_by, block_up, block_down,
+            closed_loop
+        };
+        wire unused_requests = &{1'b0, play, arm, controlled_stop, hold_target, pending};
+    end
 
     // interlock
     core_watchdog #(
@@ -340,6 +477,33 @@ module node #(
         .edm_status
     );
 
+    if (HAS_STEPPER % (1 << AXES) != 0) begin : g_lines
+        step_lines #(
+            .AXES(AXES)
+        ) u_lines (
+            .clk,
+            .rst,
+            .period    (tick_period[17:0]),
+            .tick,
+            // targets
+            .valid     (result_valid && result_kind == STEPS),
+            .axis      (result_axis),
+            .target    (result),
+            .restart_in(result_flag),
+            .stopped   (line_stopped),
+            // lines
+            .line_start,
+            .line_idle,
+            .rate_valid,
+            .rate,
+            .rate_restart,
+            .rate_steep
+        );
+    end else begin : g_no_lines
+        assign {line_start, line_idle, rate_valid, rate, rate_restart, rate_steep} = '0;
+        wire unused = &{1'b0, line_stopped};
+    end
+
     if (SHARED != 0) begin : g_chain
         interpolation_chain #(
             .AXES         (AXES),
@@ -387,23 +551,23 @@ module node #(
 
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(
-            .CLK_HZ        (CLK_HZ),
-            .W             (W),
-            .HAS_SINE      (HAS_SINE >> n & 1),
-            .HAS_OWN_CHAIN ((HAS_SINE & HAS_OWN_CHAIN) >> n & 1),
-            .HAS_MONITOR   (HAS_MONITOR >> n & 1),
-            .HAS_HARMONICS (HAS_HARMONICS >> n & 1),
-            .HAS_RECORDER  (HAS_RECORDER >> n & 1),
-            .SEGMENTS      ((HAS_SEGMENTS >> n & 1) * SEGMENTS),
-            .HAS_CAPTURE   (HAS_CAPTURE >> n & 1),
-            .HAS_COMPARE   (HAS_COMPARE >> n & 1),
-            .HAS_VELOCITY  (HAS_VELOCITY >> n & 1),
-            .HAS_DRIVE     (HAS_DRIVE >> n & 1),
-            .FILTERS       ((HAS_FILTERS >> n & 1) * FILTERS),
-            .HAS_BRIDGE    (HAS_BRIDGE >> n & 1),
-            .HAS_STEPPER   (HAS_STEPPER >> n & 1),
-            .HAS_DAC       (HAS_DAC >> n & 1),
-            .HAS_FINE_STAGE(HAS_FINE_STAGE >> n & 1)
+            .W                (W),
+            .HAS_SINE         (HAS_SINE >> n & 1),
+            .HAS_OWN_CHAIN    ((HAS_SINE & HAS_OWN_CHAIN) >> n & 1),
+            .HAS_MONITOR      (HAS_MONITOR >> n & 1),
+            .HAS_HARMONICS    (HAS_HARMONICS >> n & 1),
+            .HAS_RECORDER     (HAS_RECORDER >> n & 1),
+            .SEGMENTS         ((HAS_SEGMENTS >> n & 1) * SEGMENTS),
+            .HAS_CAPTURE      (HAS_CAPTURE >> n & 1),
+            .HAS_COMPARE      (HAS_COMPARE >> n & 1),
+            .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK >> n & 1),
+            .HAS_VELOCITY     (HAS_VELOCITY >> n & 1),
+            .HAS_DRIVE        (HAS_DRIVE >> n & 1),
+            .FILTERS          ((HAS_FILTERS >> n & 1) * FILTERS),
+            .HAS_BRIDGE       (HAS_BRIDGE >> n & 1),
+            .HAS_STEPPER      (HAS_STEPPER >> n & 1),
+            .HAS_DAC          (HAS_DAC >> n & 1),
+            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1)
         ) u_axis (
             .clk,
             .rst,
@@ -420,15 +584,45 @@ module node #(
             .actuator_rdata       (actuator_rdata[32*n+:32]),
             // time
             .tick,
-            .tick_period,
             .sample_tick,
+            .limit_tick,
             .now                  (now[31:0]),
             // node
             .start                (start[n]),
+            .servo_overrun,
             .sync,
             .estop,
             .watchdog_expired,
             .cpu_stopped,
+            // motion_engine: what it is given
+            .position             (position[48*n+:48]),
+            .step_made            (step_made[n]),
+            .step_down            (step_down[n]),
+            .moves                (moves[n]),
+            .moved                (moved[n]),
+            .moved_by             (moved_by[48*n+:48]),
+            .block_up             (block_up[n]),
+            .block_down           (block_down[n]),
+            .closed_loop          (closed_loop[n]),
+            .play                 (play[n]),
+            .arm                  (arm[n]),
+            .controlled_stop      (controlled_stop[n]),
+            .hold_target          (hold_target[n]),
+            // motion_engine: its results
+            .waits                (request_waits[n]),
+            .pending              (pending[n]),
+            .result_valid         (result_valid && result_axis == 3'(n)),
+            .result_kind,
+            .result,
+            .result_flag,
+            // step_lines
+            .line_start,
+            .line_idle,
+            .rate_valid           (rate_valid[n]),
+            .rate,
+            .rate_restart,
+            .rate_steep,
+            .line_stopped         (line_stopped[n]),
             // pins of the scale
             .encoder_a            (encoder_a[n]),
             .encoder_b            (encoder_b[n]),

@@ -79,7 +79,6 @@ SETTINGS = (  # written by the register bus
     "trim_scale",
     "quantum",
     "start_at",
-    "shift_by",
     "segment_velocity",
     "segment_acceleration",
     "segment_jerk",
@@ -136,6 +135,7 @@ OUTSIDE = ("0", "product", "product_high", "product_low", "halve") + (
     "period",
     "now",
     "flags",
+    "shift_by",
 )
 OPERANDS = (  # how a line names what it adds
     {name: number_of(at) for name, at in ADDRESS.items() if at < 128}
@@ -992,6 +992,23 @@ STEADY = (*PASSING, "lost", "lost_off", "powerless", "off", "closed", "stepped",
 )
 
 
+def tested_later(lines: list[Line], follow: list[list[int]]) -> list[frozenset[str]]:
+    """For each line, the steady conditions of which a value known before it matters: those that it
+    or a later line tests before they change.
+    """
+    tested: list[frozenset[str]] = [frozenset()] * (len(lines) + 1)
+    settled = False
+    while not settled:
+        settled = True
+        for n in reversed(range(len(lines))):
+            line = lines[n]
+            later = frozenset().union(*(tested[m] for m in follow[n])) - line.changes
+            found = later | ({line.condition} & {*STEADY})
+            if found != tested[n]:
+                tested[n], settled = found, False
+    return tested
+
+
 def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool) -> list[int]:
     """The longest path from a label to the line `end`, both included, as the numbers of its lines.
     A jump back is taken once, to the next filter `filters` times; a repeated line counts as often
@@ -999,6 +1016,7 @@ def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool
     """
     labels = {line.label: n for n, line in enumerate(lines) if line.label}
     follow = successors(lines)
+    tested = tested_later(lines, follow)
     memory: dict[tuple[int, object], tuple[int, ...]] = {}
 
     def repeated(n: int) -> int:
@@ -1039,7 +1057,7 @@ def longest(lines: list[Line], begin: str, end: int, filters: int, ticking: bool
                 if taken.count(m) >= most:
                     continue
                 now = tuple(sorted((*taken, m)))
-            rest = walk(m, now, frozenset(after.items()))
+            rest = walk(m, now, frozenset(fact for fact in after.items() if fact[0] in tested[m]))
             if rest and len(rest) + repeated(n) > len(best):
                 best = (n,) * repeated(n) + rest
         memory[key] = best
@@ -1095,9 +1113,9 @@ def text() -> str:
         f"        lines[{n}] = 36'h{code:09x};  // {line}".rstrip()
         for n, (line, code) in enumerate(codes())
     ]
-    between = worst(lines, 0)[0]
     bounds = [worst(lines, filters) for filters in range(5)]
-    choice = " : ".join(f"FILTERS == {n} ? 16'd{axis}" for n, (_, axis) in enumerate(bounds[:-1]))
+    between = bounds[0][0]
+    choice = " : ".join(f"FILTERS == {n} ? {axis}" for n, (_, axis) in enumerate(bounds[:-1]))
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
@@ -1113,8 +1131,9 @@ def text() -> str:
 `default_nettype none
 
 module engine_microcode #(
-    parameter int AXES    = 1,  // axes of the engine, 1 to 8
-    parameter int FILTERS = 0   // filters of each axis, 0 to 4
+    parameter int AXES        = 1,  // axes of the engine, 1 to 8
+    parameter int FILTERS     = 0,  // filters of each axis, 0 to 4
+    parameter int TICK_CYCLES = 0   // cycles between two ticks; 0: not checked
 ) (
     input  wire         clk,
     input  wire  [ 9:0] next,        // number of a line to be read
@@ -1123,9 +1142,14 @@ module engine_microcode #(
     output logic [35:0] target_code, // code of the line `target`
     output logic [15:0] cycles       // cycles that a tick needs at most
 );""",
-            f"    localparam logic [15:0] AXIS = {choice} : 16'd{bounds[-1][1]};",
+            f"    localparam int AXIS = {choice} : {bounds[-1][1]};",
+            f"    localparam int CYCLES = {between} + AXES * AXIS;",
             "",
-            f"    assign cycles = 16'd{between} + 16'(AXES) * AXIS;",
+            "    if (TICK_CYCLES != 0 && TICK_CYCLES < CYCLES) begin : g_check",
+            "        A_SERVO_TICK_HAS_TOO_FEW_CYCLES_FOR_THE_AXES u_error ();",
+            "    end",
+            "",
+            "    assign cycles = 16'(CYCLES);",
             "",
             f'    (* rom_style = "block" *) logic [35:0] lines[0:{LINES - 1}];',
             "",

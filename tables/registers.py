@@ -65,6 +65,7 @@ class Field:
     on_write: bool  # swmod or passed: a strobe follows a write
     on_read: bool  # swacc: a strobe goes with a read
     passed: bool  # a setting that its block does not hold
+    momentary: bool  # its port is 0 in all cycles but that of the strobe of a write
     needs: str  # parameter of the block without which a setting has no bits and reads 0
     signal: str  # its port in the block; a bit of the register's port in a vector
     state: str  # what the block reads: the port itself, or the bits that it holds
@@ -118,6 +119,7 @@ class Register:
     wide: bool
     vector: bool
     text: str
+    engine: str  # word of motion_engine that holds it, or none
     fields: tuple[Field, ...]
 
     @property
@@ -186,6 +188,15 @@ class Block:
     def fields(self) -> list[tuple[Register, Field]]:
         return [(r, f) for r in self.registers for f in r.fields]
 
+    @property
+    def own(self) -> list[Register]:
+        """The registers of which the block itself has something: all but those of the engine."""
+        return [r for r in self.registers if not r.engine]
+
+    @property
+    def own_fields(self) -> list[tuple[Register, Field]]:
+        return [(r, f) for r in self.own for f in r.fields]
+
     def answers(self, constant: int) -> list[Answer]:
         return [a for r in self.registers for a in r.answers(constant)]
 
@@ -201,23 +212,23 @@ class Block:
     @property
     def parameters(self) -> list[str]:
         """Those that decide which settings the block itself holds."""
-        return sorted({f.needs for _, f in self.fields if f.needs and not f.passed})
+        return sorted({f.needs for _, f in self.own_fields if f.needs and not f.passed})
 
     @property
     def wide_settings(self) -> list[Register]:
-        return [r for r in self.registers if r.wide and r.fields[0].kind == "setting"]
+        return [r for r in self.own if r.wide and r.fields[0].kind == "setting"]
 
     @property
     def unused(self) -> int:
         """The lowest bit of wdata that no register of this block has; all above are unused too."""
         taken = ("setting", "pulse", "sticky")
-        fields = [(r, f) for r, f in self.fields if f.kind in taken and not f.passed]
+        fields = [(r, f) for r, f in self.own_fields if f.kind in taken and not f.passed]
         return max((f.low + f.width - 32 * r.wide for r, f in fields), default=0)
 
     @property
     def ports(self) -> list[Fitted]:
         """(direction, shape, name, text) of each port behind the register bus."""
-        return fitted([port for r in self.registers for port in ports(r)])
+        return fitted([port for r in self.own for port in ports(r)])
 
 
 Texts = dict[str, list[str]]  # an expression: the words {kind, word} that it is for
@@ -366,6 +377,10 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         (get("swmod") and kind != "setting", "swmod is only for what software sets"),
         (needs and kind != "setting", "only a setting may need a parameter"),
         (passed and (kind != "setting" or wide), "only a setting of 32 bits may be passed"),
+        (
+            get("momentary") and (wide or needs or passed or not get("swmod")),
+            "momentary is for swmod alone",
+        ),
         (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
         (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
         (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),
@@ -390,6 +405,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         on_write=bool(get("swmod")) or passed,
         on_read=bool(get("swacc")),
         passed=passed,
+        momentary=bool(get("momentary")),
         needs=needs,
         signal=signal,
         state=signal.replace(parent, parent + held, 1) if vector else port + held,
@@ -409,10 +425,15 @@ def register_of(node: Node) -> Register:
         raise Refused(f"{node.get_path()}: 32 bits, or 64 with accesswidth 32")
     fields = tuple(field_of(f, node) for f in node.children() if isinstance(f, FieldNode))
     whole = [f.low for f in fields] == list(range(len(fields)))
+    engine = str(node.get_property("engine") or "")
+    if engine and any(f.kind != "setting" or f.on_write for f in fields):
+        raise Refused(f"{node.get_path()}: a word of the engine holds settings only")
+    if width == 64 and any(f.kind == "setting" and f.reset for f in fields):
+        raise Refused(f"{node.get_path()}: a setting of 64 bits begins at 0")
     if vector and not (whole and len({f.kind for f in fields}) == 1):
         raise Refused(f"{node.get_path()}: a vector has one kind of bits, from bit 0 on")
     offset = node.raw_address_offset
-    return Register(node.inst_name, offset, width == 64, vector, described(node), fields)
+    return Register(node.inst_name, offset, width == 64, vector, described(node), engine, fields)
 
 
 def read(axes: int = 1, source: Path = SOURCE) -> list[Block]:

@@ -8,8 +8,8 @@ A command is a line of an indented or `sh` code block that begins with `moire`, 
   `<!-- machine: s4 -->` where this is not the stage of S0;
 - a code block with the info string `csv NAME` is written to the file NAME first;
 - a `python` code block that begins with an import is run as a program;
-- `moire twin` serves until the next one or the end of the page, and what would run for ever is
-  ended by Ctrl-C;
+- `moire twin` serves until the next one, an experiment or the end of the page, and what would run
+  for ever is ended by Ctrl-C;
 - targets of make that would call the tests again, or need tens of minutes, are only resolved
   (`make -n`); experiments are ended after LONGEST_S unless --whole is given.
 
@@ -144,6 +144,7 @@ class Session:
         if ENDLESS.match(words):
             limit, may_be_stopped = ENDLESS_S, True
         elif EXPERIMENT.match(command):
+            self.close()  # it has a twin of its own
             limit = 2 * 3600 if self.whole else LONGEST_S
             may_be_stopped = not self.whole
         here = self.folder if words.startswith("moire") else ROOT

@@ -11,8 +11,9 @@
 `default_nettype none
 
 module engine_microcode #(
-    parameter int AXES    = 1,  // axes of the engine, 1 to 8
-    parameter int FILTERS = 0   // filters of each axis, 0 to 4
+    parameter int AXES        = 1,  // axes of the engine, 1 to 8
+    parameter int FILTERS     = 0,  // filters of each axis, 0 to 4
+    parameter int TICK_CYCLES = 0   // cycles between two ticks; 0: not checked
 ) (
     input  wire         clk,
     input  wire  [ 9:0] next,         // number of a line to be read
@@ -21,10 +22,15 @@ module engine_microcode #(
     output logic [35:0] target_code,  // code of the line `target`
     output logic [15:0] cycles        // cycles that a tick needs at most
 );
-    localparam logic [15:0] AXIS = FILTERS == 0 ? 16'd365 : FILTERS == 1 ? 16'd430 : FILTERS == 2 ?
-        16'd484 : FILTERS == 3 ? 16'd538 : 16'd592;
+    localparam int AXIS = FILTERS == 0 ? 365 : FILTERS == 1 ? 430 : FILTERS == 2 ? 484 : FILTERS ==
+        3 ? 538 : 592;
+    localparam int CYCLES = 76 + AXES * AXIS;
 
-    assign cycles = 16'd76 + 16'(AXES) * AXIS;
+    if (TICK_CYCLES != 0 && TICK_CYCLES < CYCLES) begin : g_check
+        A_SERVO_TICK_HAS_TOO_FEW_CYCLES_FOR_THE_AXES u_error ();
+    end
+
+    assign cycles = 16'(CYCLES);
 
     (* rom_style = "block" *) logic [35:0] lines[0:1023];
 
@@ -86,13 +92,13 @@ module engine_microcode #(
         lines[54] = 36'h00007fc20;  // acc
         lines[55] = 36'h10f07fc20;  // ; unless shift_seen unshifted
         lines[56] = 36'h00007e540;  // shift: anchor
-        lines[57] = 36'h00002ada0;  // acc + shift_by -> anchor
+        lines[57] = 36'h00002bea0;  // acc + shift_by -> anchor
         lines[58] = 36'h00007e5c0;  // target
-        lines[59] = 36'h20402eda0;  // acc + shift_by -> target ; give target
+        lines[59] = 36'h20402fea0;  // acc + shift_by -> target ; give target
         lines[60] = 36'h00007e680;  // last_position
-        lines[61] = 36'h300034da0;  // acc + shift_by -> last_position ; done shift
+        lines[61] = 36'h300035ea0;  // acc + shift_by -> last_position ; done shift
         lines[62] = 36'h00007e6c0;  // run
-        lines[63] = 36'h134036da0;  // acc + shift_by -> run ; set rebased
+        lines[63] = 36'h134037ea0;  // acc + shift_by -> run ; set rebased
         lines[64] = 36'h00007fc20;  // acc
         lines[65] = 36'h17987fc20;  // ; if start_now start
         lines[66] = 36'h1d487fc20;  // ; if ticking measure
@@ -108,16 +114,16 @@ module engine_microcode #(
         lines[76] = 36'h208031c00;  // 0 -> target_velocity ; give target_velocity
         lines[77] = 36'h0a0033c00;  // 0 -> target_acceleration ; empty
         lines[78] = 36'h16f17fc20;  // unset: ; unless push_seen unpushed
-        lines[79] = 36'h00007eec9;  // one ; y
-        lines[80] = 36'h00007ee86;  // segment_ticks ; x
-        lines[81] = 36'h00007ee91;  // - segment_ticks ; test
+        lines[79] = 36'h00007ee89;  // one ; y
+        lines[80] = 36'h00007ee46;  // segment_ticks ; x
+        lines[81] = 36'h00007ee51;  // - segment_ticks ; test
         lines[82] = 36'h30807fc20;  // ; done push
         lines[83] = 36'h16cf7fc20;  // ; if full unpushed
         lines[84] = 36'h16c17fc20;  // ; if braking unpushed
         lines[85] = 36'h16ec7fc20;  // ; unless negative unpushed
-        lines[86] = 36'h000068dc0;  // segment_velocity -> tail_velocity
-        lines[87] = 36'h00006ae00;  // segment_acceleration -> tail_acceleration
-        lines[88] = 36'h00007ee40;  // segment_jerk
+        lines[86] = 36'h000068d80;  // segment_velocity -> tail_velocity
+        lines[87] = 36'h00006adc0;  // segment_acceleration -> tail_acceleration
+        lines[88] = 36'h00007ee00;  // segment_jerk
         lines[89] = 36'h00006dca0;  // acc + product_high -> tail_rest
         lines[90] = 36'h09c07fc20;  // ; push
         lines[91] = 36'h00007fc20;  // unpushed: acc
@@ -146,7 +152,7 @@ module engine_microcode #(
         lines[114] = 36'h00007fc20;  // acc
         lines[115] = 36'h20000de40;  // flags -> context ; give state
         lines[116] = 36'h0ae07fc20;  // ; goto scan
-        lines[117] = 36'h00007ef09;  // measure: byte ; y
+        lines[117] = 36'h00007eec9;  // measure: byte ; y
         lines[118] = 36'h00007fd40;  // position
         lines[119] = 36'h00007e6b6;  // acc - last_position ; x
         lines[120] = 36'h00007ed06;  // quantum ; x
@@ -158,7 +164,7 @@ module engine_microcode #(
         lines[126] = 36'h00004bc20;  // edge: acc -> base
         lines[127] = 36'h00007e700;  // quiet
         lines[128] = 36'h000049da0;  // acc + elapsed -> part
-        lines[129] = 36'h00007f0b1;  // acc - longest ; test
+        lines[129] = 36'h00007f071;  // acc - longest ; test
         lines[130] = 36'h00007fdc0;  // period
         lines[131] = 36'h21e639db0;  // acc - elapsed -> quiet ; unless anchored fresh
         lines[132] = 36'h21ec7e940;  // base ; unless negative fresh
@@ -169,14 +175,14 @@ module engine_microcode #(
         lines[137] = 36'h2f207fc20;  // ; goto near
         lines[138] = 36'h00007e700;  // still: quiet
         lines[139] = 36'h00007fde0;  // acc + period
-        lines[140] = 36'h00007f0b2;  // acc - longest ; below
-        lines[141] = 36'h2ee6390a0;  // acc + longest -> quiet ; unless anchored limits
+        lines[140] = 36'h00007f072;  // acc - longest ; below
+        lines[141] = 36'h2ee639060;  // acc + longest -> quiet ; unless anchored limits
         lines[142] = 36'h00007fdc0;  // period
         lines[143] = 36'h00007fc20;  // acc
         lines[144] = 36'h00007e730;  // acc - quiet
         lines[145] = 36'h00007e731;  // acc - quiet ; test
         lines[146] = 36'h150048700;  // quiet -> part ; set bounding
-        lines[147] = 36'h2eec7f0b0;  // acc - longest ; unless negative limits
+        lines[147] = 36'h2eec7f070;  // acc - longest ; unless negative limits
         lines[148] = 36'h00007fc21;  // acc ; test
         lines[149] = 36'h00007e740;  // speed
         lines[150] = 36'h264c7fc00;  // 0 ; if negative signed
@@ -187,7 +193,7 @@ module engine_microcode #(
         lines[155] = 36'h00007e920;  // acc + part
         lines[156] = 36'h00007fdf3;  // acc - period ; above
         lines[157] = 36'h00004bde0;  // acc + period -> base
-        lines[158] = 36'h00007efc9;  // two20 ; y
+        lines[158] = 36'h00007ef89;  // two20 ; y
         lines[159] = 36'h00007fdc6;  // period ; x
         lines[160] = 36'h00007e946;  // base ; x
         lines[161] = 36'h2d007fc20;  // ; count 20
@@ -223,18 +229,18 @@ module engine_microcode #(
         lines[191] = 36'h00007e9a3;  // acc + magnitude ; above
         lines[192] = 36'h00007e9b0;  // acc - magnitude
         lines[193] = 36'h00007e8e0;  // acc + total
-        lines[194] = 36'h00007ef64;  // acc + half_byte >> 8
-        lines[195] = 36'h00007f0f2;  // acc - top ; below
-        lines[196] = 36'h00007f163;  // acc + range ; above
-        lines[197] = 36'h20c03d130;  // acc - two31 -> measured ; give velocity
+        lines[194] = 36'h00007ef24;  // acc + half_byte >> 8
+        lines[195] = 36'h00007f0b2;  // acc - top ; below
+        lines[196] = 36'h00007f123;  // acc + range ; above
+        lines[197] = 36'h20c03d0f0;  // acc - two31 -> measured ; give velocity
         lines[198] = 36'h35247fc20;  // ; unless armed make
         lines[199] = 36'h00007fe00;  // now
         lines[200] = 36'h00007ed77;  // acc - start_at ; x_low
-        lines[201] = 36'h00007eec9;  // one ; y
+        lines[201] = 36'h00007ee89;  // one ; y
         lines[202] = 36'h00007fc20;  // acc
         lines[203] = 36'h00007fc20;  // acc
         lines[204] = 36'h00007fc40;  // product
-        lines[205] = 36'h00007f131;  // acc - two31 ; test
+        lines[205] = 36'h00007f0f1;  // acc - two31 ; test
         lines[206] = 36'h00007fc20;  // acc
         lines[207] = 36'h352c7fc20;  // ; unless negative make
         lines[208] = 36'h1a007fc20;  // ; clear armed
@@ -250,15 +256,15 @@ module engine_microcode #(
         lines[218] = 36'h00007fc25;  // acc >> 24
         lines[219] = 36'h20402e560;  // acc + anchor -> target ; give target
         lines[220] = 36'h00007e2c5;  // step >> 24
-        lines[221] = 36'h00007f0f2;  // acc - top ; below
-        lines[222] = 36'h00007f163;  // acc + range ; above
-        lines[223] = 36'h208031130;  // acc - two31 -> target_velocity ; give target_velocity
+        lines[221] = 36'h00007f0b2;  // acc - top ; below
+        lines[222] = 36'h00007f123;  // acc + range ; above
+        lines[223] = 36'h2080310f0;  // acc - two31 -> target_velocity ; give target_velocity
         lines[224] = 36'h00007e505;  // change >> 24
-        lines[225] = 36'h00007f0f2;  // acc - top ; below
-        lines[226] = 36'h00007f163;  // acc + range ; above
-        lines[227] = 36'h000033130;  // acc - two31 -> target_acceleration
+        lines[225] = 36'h00007f0b2;  // acc - top ; below
+        lines[226] = 36'h00007f123;  // acc + range ; above
+        lines[227] = 36'h0000330f0;  // acc - two31 -> target_acceleration
         lines[228] = 36'h3b607fc20;  // ; goto made
-        lines[229] = 36'h09007f025;  // end: acc + half_step >> 24 ; stand
+        lines[229] = 36'h09007efe5;  // end: acc + half_step >> 24 ; stand
         lines[230] = 36'h20402e560;  // acc + anchor -> target ; give target
         lines[231] = 36'h00002bc20;  // acc -> anchor
         lines[232] = 36'h00002dc00;  // 0 -> moved
@@ -268,9 +274,9 @@ module engine_microcode #(
         lines[236] = 36'h000033c00;  // 0 -> target_acceleration
         lines[237] = 36'h00007e5c0;  // made: target
         lines[238] = 36'h00007fd70;  // acc - position
-        lines[239] = 36'h00007f0f2;  // acc - top ; below
-        lines[240] = 36'h00007f163;  // acc + range ; above
-        lines[241] = 36'h00003f131;  // acc - two31 -> error ; test
+        lines[239] = 36'h00007f0b2;  // acc - top ; below
+        lines[240] = 36'h00007f123;  // acc + range ; above
+        lines[241] = 36'h00003f0f1;  // acc - two31 -> error ; test
         lines[242] = 36'h00007fc20;  // acc
         lines[243] = 36'h3d6c4dc20;  // acc -> magnitude ; unless negative positive
         lines[244] = 36'h00004c7d0;  // - error -> magnitude
@@ -283,7 +289,7 @@ module engine_microcode #(
         lines[251] = 36'h1a4041c00;  // 0 -> integral ; clear powered
         lines[252] = 36'h40d6c3c00;  // 0 -> sum ; if lost_off integrate
         lines[253] = 36'h00007e886;  // command ; x
-        lines[254] = 36'h00007ef89;  // two16 ; y
+        lines[254] = 36'h00007ef49;  // two16 ; y
         lines[255] = 36'h00007fc20;  // acc
         lines[256] = 36'h00007fc20;  // acc
         lines[257] = 36'h000043c40;  // product -> sum
@@ -325,10 +331,10 @@ module engine_microcode #(
         lines[293] = 36'h4dc4ffc20;  // ; if powered asked
         lines[294] = 36'h4dac7fc20;  // retake: ; unless negative computed
         lines[295] = 36'h00007e8c0;  // total
-        lines[296] = 36'h00007f232;  // acc - top34 ; below
-        lines[297] = 36'h00007f263;  // acc + range34 ; above
-        lines[298] = 36'h0000491f0;  // acc - two33 -> part
-        lines[299] = 36'h00007ef09;  // byte ; y
+        lines[296] = 36'h00007f1f2;  // acc - top34 ; below
+        lines[297] = 36'h00007f223;  // acc + range34 ; above
+        lines[298] = 36'h0000491b0;  // acc - two33 -> part
+        lines[299] = 36'h00007eec9;  // byte ; y
         lines[300] = 36'h00007e840;  // sum
         lines[301] = 36'h00007e936;  // acc - part ; x
         lines[302] = 36'h00007e800;  // integral
@@ -342,7 +348,7 @@ module engine_microcode #(
         lines[310] = 36'h12407fc20;  // computed: ; set powered
         lines[311] = 36'h1a8049c20;  // asked: acc -> part ; clear limited_up
         lines[312] = 36'h1ac07eb70;  // acc - output_limit ; clear limited_down
-        lines[313] = 36'h31807efb1;  // acc - two16 ; test, done gains
+        lines[313] = 36'h31807ef71;  // acc - two16 ; test, done gains
         lines[314] = 36'h00007fc20;  // acc
         lines[315] = 36'h4f8c7eb40;  // output_limit ; if negative lower
         lines[316] = 36'h128043c20;  // acc -> sum ; set limited_up
@@ -356,7 +362,7 @@ module engine_microcode #(
         lines[324] = 36'h00004bc20;  // sample: acc -> base
         lines[325] = 36'h52d5ffc20;  // ; if closed section
         lines[326] = 36'h00007ec06;  // open_command ; x
-        lines[327] = 36'h00007ef89;  // two16 ; y
+        lines[327] = 36'h00007ef49;  // two16 ; y
         lines[328] = 36'h00007fc20;  // acc
         lines[329] = 36'h00007fc20;  // acc
         lines[330] = 36'h00004bc40;  // product -> base
@@ -385,14 +391,14 @@ module engine_microcode #(
         lines[353] = 36'h000047c60;  // acc + product -> total
         lines[354] = 36'h00007f506;  // c2 ; x
         lines[355] = 36'h00007f709;  // y2 ; y
-        lines[356] = 36'h00007eec9;  // one ; y
+        lines[356] = 36'h00007ee89;  // one ; y
         lines[357] = 36'h00007e8c0;  // total
         lines[358] = 36'h000047c65;  // acc + earlier_product >> 24 -> total
         lines[359] = 36'h00007fc24;  // acc >> 8
         lines[360] = 36'h00004dc20;  // acc -> magnitude
-        lines[361] = 36'h00007f0f2;  // acc - top ; below
-        lines[362] = 36'h00007f163;  // acc + range ; above
-        lines[363] = 36'h000049130;  // acc - two31 -> part
+        lines[361] = 36'h00007f0b2;  // acc - top ; below
+        lines[362] = 36'h00007f123;  // acc + range ; above
+        lines[363] = 36'h0000490f0;  // acc - two31 -> part
         lines[364] = 36'h00007e8c7;  // total ; x_low
         lines[365] = 36'h00007e980;  // magnitude
         lines[366] = 36'h00007e931;  // acc - part ; test
@@ -408,7 +414,7 @@ module engine_microcode #(
         lines[376] = 36'h5e8c7fc20;  // ; if negative newer
         lines[377] = 36'h00007fc00;  // track: 0
         lines[378] = 36'h00007dc20;  // newer: acc -> filtering
-        lines[379] = 36'h00007aed0;  // - one -> known
+        lines[379] = 36'h00007ae90;  // - one -> known
         lines[380] = 36'h000075640;  // x1 -> x2
         lines[381] = 36'h000072940;  // base -> x1
         lines[382] = 36'h0000796c0;  // y1 -> y2
@@ -443,7 +449,7 @@ module engine_microcode #(
         lines[411] = 36'h1a4041c00;  // 0 -> integral ; clear powered
         lines[412] = 36'h6897c3c00;  // 0 -> sum ; if off trim
         lines[413] = 36'h00007e886;  // command ; x
-        lines[414] = 36'h00007ef89;  // two16 ; y
+        lines[414] = 36'h00007ef49;  // two16 ; y
         lines[415] = 36'h00007fc20;  // acc
         lines[416] = 36'h00007fc20;  // acc
         lines[417] = 36'h000043c40;  // product -> sum
@@ -493,7 +499,7 @@ module engine_microcode #(
         lines[461] = 36'h6f607fc20;  // ; goto choose
         lines[462] = 36'h00007fc20;  // divide: acc
         lines[463] = 36'h00007fa87;  // increment ; x_low
-        lines[464] = 36'h00007f109;  // two31 ; y
+        lines[464] = 36'h00007f0c9;  // two31 ; y
         lines[465] = 36'h00007e51d;  // - change ; upward
         lines[466] = 36'h00007fc20;  // acc
         lines[467] = 36'h00004bc40;  // product -> base
@@ -516,7 +522,7 @@ module engine_microcode #(
         lines[484] = 36'h000049a70;  // acc - slope -> part
         lines[485] = 36'h00007fab1;  // acc - increment ; test
         lines[486] = 36'h00007fa40;  // slope
-        lines[487] = 36'h9dec7f2f0;  // acc - two66 ; unless negative at_end
+        lines[487] = 36'h9dec7f2b0;  // acc - two66 ; unless negative at_end
         lines[488] = 36'h00007fc21;  // acc ; test
         lines[489] = 36'h00007fa47;  // slope ; x_low
         lines[490] = 36'h00007fa48;  // slope ; x_high
@@ -525,7 +531,7 @@ module engine_microcode #(
         lines[493] = 36'h00007fca0;  // acc + product_high
         lines[494] = 36'h00004ba60;  // acc + slope -> base
         lines[495] = 36'h00007fc40;  // product
-        lines[496] = 36'h00007f2b1;  // acc - two36 ; test
+        lines[496] = 36'h00007f271;  // acc - two36 ; test
         lines[497] = 36'h00007e940;  // base
         lines[498] = 36'h000061d00;  // halve -> area
         lines[499] = 36'h9dec7fa50;  // - slope ; unless negative at_end
@@ -582,8 +588,8 @@ module engine_microcode #(
         lines[550] = 36'h00007fc20;  // acc
         lines[551] = 36'h9e09a9a4e;  // along slope -> change ; if halting settle
         lines[552] = 36'h00007e4e3;  // acc + rate ; above
-        lines[553] = 36'h00007f1b2;  // acc - full ; below
-        lines[554] = 36'h8c60271a0;  // acc + full -> rate ; goto advance
+        lines[553] = 36'h00007f172;  // acc - full ; below
+        lines[554] = 36'h8c6027160;  // acc + full -> rate ; goto advance
         lines[555] = 36'h000025c00;  // begin: 0 -> offset
         lines[556] = 36'h000023c00;  // 0 -> fraction
         lines[557] = 36'h00004bc00;  // 0 -> base
@@ -598,14 +604,14 @@ module engine_microcode #(
         lines[566] = 36'h0a007e500;  // change ; empty
         lines[567] = 36'h9e207fc20;  // ; goto settle
         lines[568] = 36'h00007f880;  // take: head_rest
-        lines[569] = 36'h00007f128;  // acc + two31 ; x_high
-        lines[570] = 36'h00007eec9;  // one ; y
+        lines[569] = 36'h00007f0e8;  // acc + two31 ; x_high
+        lines[570] = 36'h00007ee89;  // one ; y
         lines[571] = 36'h19000f800;  // head_velocity -> velocity ; clear last
         lines[572] = 36'h00001d840;  // head_acceleration -> acceleration
         lines[573] = 36'h00007f880;  // head_rest
         lines[574] = 36'h00001fcb0;  // acc - product_high -> jerk
         lines[575] = 36'h000021c40;  // product -> left
-        lines[576] = 36'h00007f071;  // acc - two24 ; test
+        lines[576] = 36'h00007f031;  // acc - two24 ; test
         lines[577] = 36'h09807fc20;  // acc ; pop
         lines[578] = 36'h910c7fc20;  // acc ; if negative loaded
         lines[579] = 36'h110021c20;  // acc -> left ; set last
@@ -617,7 +623,7 @@ module engine_microcode #(
         lines[585] = 36'h9688ffc20;  // ; if crossed scale
         lines[586] = 36'h00007e440;  // go_on: fraction
         lines[587] = 36'h0000224e0;  // acc + rate -> fraction
-        lines[588] = 36'h00007f1b1;  // acc - full ; test
+        lines[588] = 36'h00007f171;  // acc - full ; test
         lines[589] = 36'h00007e940;  // base
         lines[590] = 36'h968c7fc20;  // ; if negative scale
         lines[591] = 36'h00004a1e0;  // acc + velocity -> base
@@ -626,10 +632,10 @@ module engine_microcode #(
         lines[594] = 36'h00007e380;  // acceleration
         lines[595] = 36'h00001c3e0;  // acc + jerk -> acceleration
         lines[596] = 36'h00007e400;  // left
-        lines[597] = 36'h000020ef0;  // acc - one -> left
-        lines[598] = 36'h00007eef1;  // acc - one ; test
+        lines[597] = 36'h000020eb0;  // acc - one -> left
+        lines[598] = 36'h00007eeb1;  // acc - one ; test
         lines[599] = 36'h00007e440;  // fraction
-        lines[600] = 36'h1440231b0;  // acc - full -> fraction ; set crossed
+        lines[600] = 36'h144023170;  // acc - full -> fraction ; set crossed
         lines[601] = 36'h8c8c7fc20;  // ; if negative load
         lines[602] = 36'h00007fc20;  // scale: acc
         lines[603] = 36'h00007e451;  // - fraction ; test

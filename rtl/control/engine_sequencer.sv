@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_sequencer -- fetch the lines of the microcode of motion_engine, decide the jumps, and serve
-// one axis after the other at each tick.
+// engine_sequencer -- fetch the lines of the microcode of motion_engine, decide the jumps, and
+// serve one axis after the other at each tick.
 //
-// latency   1 cycle from tick to busy; a jump costs no cycle. A condition is tested when its line is
-//           fetched, the actions of a line are executed two cycles later.
+// latency   1 cycle from tick to busy; a jump costs no cycle. A condition is tested when its line
+//           is fetched, the actions of a line are executed two cycles later.
 // rate      one line per cycle; a tick when the one before has been served. overrun reports a tick
 //           that comes sooner.
 // model     tb/control/engine_sequencer.py, equal in every bit of every cycle
@@ -14,8 +14,9 @@
 `default_nettype none
 
 module engine_sequencer #(
-    parameter int AXES    = 1,  // axes of the engine, 1 to 8
-    parameter int FILTERS = 0   // filters of each axis, 0 to 4
+    parameter int AXES        = 1,  // axes of the engine, 1 to 8
+    parameter int FILTERS     = 0,  // filters of each axis, 0 to 4
+    parameter int TICK_CYCLES = 0   // cycles between two ticks; 0: not checked
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -62,8 +63,9 @@ module engine_sequencer #(
     wire finishes = action == FINISHED;
 
     engine_microcode #(
-        .AXES   (AXES),
-        .FILTERS(FILTERS)
+        .AXES       (AXES),
+        .FILTERS    (FILTERS),
+        .TICK_CYCLES(TICK_CYCLES)
     ) u_microcode (
         .clk,
         .next,

@@ -2,9 +2,9 @@
 // motion_engine -- compute velocity, profile, servo and motor steps of all axes of a node in one
 // datapath, one axis after the other at each servo tick.
 //
-// latency   `cycles` at most from tick to the last result: 76 and 365 for each axis without filters,
-//           484 with two filters, 592 with four. The results of an axis come before the next step of
-//           its profile is prepared, which is the last third of its time.
+// latency   `cycles` at most from tick to the last result: 76 and 365 for each axis without
+//           filters, 484 with two filters, 592 with four. The results of an axis come before the
+//           next step of its profile is prepared, which is the last third of its time.
 // rate      a tick when the one before has been served, else overrun is reported and what the axes
 //           show is not certain; between two ticks one request of an axis per 20 to 70 cycles
 // accuracy  Profile: exact, in n ticks a segment moves by v n + a n(n-1)/2 + j n(n-1)(n-2)/6 in
@@ -14,35 +14,37 @@
 //           second half of a tick on. Motor steps: floor(position * step_ratio / 2^32) modulo 2^48.
 // method    One adder of 72 bits, one multiplier of 35 bits and one memory, controlled by the
 //           microcode of tables/engine_microcode.py. A line is fetched, its operand is read in the
-//           next cycle and added in the one after. The words of an axis, its queue, its settings and
-//           its filters are in the memory; the flags are loaded with each axis.
+//           next cycle and added in the one after. The words of an axis, its queue, its settings
+//           and its filters are in the memory; the flags are loaded with each axis.
 // behaviour All axes are sampled in the cycle of the tick, and starts that were requested before it
 //           begin at it. A start makes the profile move at once; the first tick only prepares.
 //           Requests are served between two ticks, in the order shift, set_target_to_position,
-//           push, start, arm, controlled_stop; at the tick only shifts, and starts of axes that wait
-//           for nothing else. A shift is done in the cycle in which the position moves: it is seen
-//           with the position, so the error is never disturbed. push takes the segment from the
-//           settings; it is ignored while the queue is full or a stop runs, and a segment of 0 ticks
-//           that is not the last is left out. Without a segment the acceleration stays for one tick,
-//           underrun is reported, and a controlled stop begins. Profile, feed override, servo and
-//           filters are those of the models.
-//           Results: 0 state (the flags from bit 1 on, bit 16 the head of the queue, bit 20 its
-//           length), 1 target in 2^-16 period, 2 its velocity and 3 the measured velocity in 2^-16
-//           period/tick, 4 following error in 2^-16 period (flag: above following_limit), 5 command
-//           (flag: at its limit), 6 target in 2^-16 motor step (flag: restart there), 7 underrun.
-// limits    Settings keep these units: gains 2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16
-//           command, integral_limit 2^-24 command, coefficients 2^-32, stop_deceleration 2^-40
-//           period/tick2, trim_scale 2^-16 period/command, segment_ticks bit 24: the last segment.
-//           A segment, and the amount of a shift, stay as they are while `waits` is high.
-// source    forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45;
-//           Ohmae et al., IEEE Trans. IE-29 (1982) 207, count times
+//           push, start, arm, controlled_stop; at the tick only shifts, and starts of axes that
+//           wait for nothing else. A shift is done in the cycle in which the position moves: it is
+//           seen with the position, so the error is never disturbed. push takes the segment from
+//           the settings; it is ignored while the queue is full or a stop runs, and a segment of 0
+//           ticks that is not the last is left out. Without a segment the acceleration stays for
+//           one tick, underrun is reported, and a controlled stop begins. Profile, feed override,
+//           servo and filters are those of the models. Results: 0 state (the flags from bit 1 on,
+//           bit 16 the head of the queue, bit 20 its length), 1 target in 2^-16 period, 2 its
+//           velocity and 3 the measured velocity in 2^-16 period/tick, 4 following error in 2^-16
+//           period (flag: above following_limit), 5 command (flag: at its limit), 6 target in 2^-16
+//           motor step (flag: restart there), 7 underrun.
+// limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units:
+//           gains 2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16 command, integral_limit
+//           2^-24 command, coefficients 2^-32, stop_deceleration 2^-40 period/tick2, trim_scale
+//           2^-16 period/command, segment_ticks bit 24: the last segment. A segment, and shift_by
+//           from the cycle after shift on, stay as they are while `waits` is high.
+// source    forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45; Ohmae et
+//           al., IEEE Trans. IE-29 (1982) 207, count times
 // model     tb/control/motion_engine.py, equal in every result of every tick and request
 `default_nettype none
 
 module motion_engine #(
-    parameter  int AXES    = 1,                    // axes, 1 to 8
-    parameter  int FILTERS = 0,                    // filters of each servo, 0 to 4
-    localparam int WORD_W  = FILTERS == 0 ? 7 : 8  // bits of the address of a word of an axis
+    parameter  int AXES        = 1,                    // axes, 1 to 8
+    parameter  int FILTERS     = 0,                    // filters of each servo, 0 to 4
+    parameter  int TICK_CYCLES = 0,                    // cycles between two ticks; 0: not checked
+    localparam int WORD_W      = FILTERS == 0 ? 7 : 8  // bits of the address of a word of an axis
 ) (
     input  wire                       clk,
     input  wire                       rst,
@@ -70,6 +72,7 @@ module motion_engine #(
     input  wire         [   AXES-1:0] push,                    // strobes: queue the segment
     input  wire         [   AXES-1:0] gains_changed,           // strobes: a gain is new
     input  wire         [   AXES-1:0] shift,                   // strobes: the origin moves
+    input  wire signed  [       47:0] shift_by,                // 2^-16 period, of these axes
     output logic        [   AXES-1:0] waits,                   // level: a request is not done yet
     // results
     output logic                      result_valid,            // strobe: result is new
@@ -98,6 +101,7 @@ module motion_engine #(
     localparam [3:0] Y_HIGH = 4'd11, DIVIDE = 4'd12, UPWARD = 4'd13, ALONG = 4'd14;
     localparam [3:0] PRODUCT = 4'd1, PRODUCT_HIGH = 4'd2, PRODUCT_LOW = 4'd3, HALVE = 4'd4;
     localparam [3:0] POSITION = 4'd5, ELAPSED = 4'd6, PERIOD = 4'd7, NOW = 4'd8, FLAGS = 4'd9;
+    localparam [3:0] SHIFT_BY = 4'd10;
     localparam [7:0] LOAD_CONTEXT = 8'h20, SAMPLE = 8'h23;
     localparam [7:0] STAND = 8'h24, POP = 8'h26, PUSH = 8'h27, EMPTY = 8'h28;
     localparam [7:0] BOOTED = 8'h29, FIRST_FILTER = 8'h2A, NEXT_FILTER = 8'h2B;
@@ -154,8 +158,9 @@ module motion_engine #(
     wire               off = level[2] && level[3];
 
     engine_sequencer #(
-        .AXES   (AXES),
-        .FILTERS(FILTERS)
+        .AXES       (AXES),
+        .FILTERS    (FILTERS),
+        .TICK_CYCLES(TICK_CYCLES)
     ) u_sequencer (
         .clk,
         .rst,
@@ -264,6 +269,7 @@ module motion_engine #(
             PERIOD:   outside = {24'd0, period};
             NOW:      outside = {16'd0, seen_now};
             FLAGS:    outside = {23'd0, queued, head, flags[15:0]};
+            SHIFT_BY: outside = shift_by;
             default:  outside = '0;
         endcase
         case (source)

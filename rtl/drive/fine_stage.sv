@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// fine_stage -- PI loop of the fine stage, which works on the same target and position as the main
-// servo and drives the DAC.
+// fine_stage -- PI loop of the fine stage, which works on the same target as the main servo and
+// drives the DAC.
 //
-// latency  61 cycles from tick to command
-// rate     one command per tick, a tick at least 61 cycles after the one before
+// latency  53 cycles from tick to command
+// rate     one command per tick, a tick at least 53 cycles after the one before
 // behaviour  While the fine stage does not hold the position, its command returns to the middle by
 //          RETURN in each tick. That is slow enough for the main servo to follow. When the fine
 //          stage takes over, its loop continues from the command that it has at that moment.
@@ -22,9 +22,8 @@ module fine_stage #(
     input  wire         [23:0] ki,             // 2^-24 command/LSB of position, each tick
     input  wire         [14:0] limit,          // largest |command|, full scale 2^15
     input  wire                gains_changed,  // strobe: kp is new
-    input  wire                tick,           // strobe: servo tick
+    input  wire                tick,           // strobe: target of this servo tick is known
     input  wire signed  [47:0] target,         // 2^-16 period
-    input  wire                moving,         // level: a profile is being played
     input  wire signed  [47:0] position,       // 2^-16 period
     output logic               valid,          // strobe: command is new
     output logic signed [15:0] command,        // full scale 2^15
@@ -33,48 +32,25 @@ module fine_stage #(
     wire signed [15:0] highest = {1'b0, limit};
     wire signed [15:0] closer = command > RETURN ? command - RETURN :
                                 command < -RETURN ? command + RETURN : 16'sd0;
-    wire signed [31:0] error;
-    wire clipped;
 
-    pid_servo #(
-        .TERMS  (2),
-        .BIQUADS(0)
-    ) u_loop (
+    pi_loop u_loop (
         .clk,
         .rst,
-        .closed_loop        (hold && enable),
+        .power       (enable),
+        .closed_loop (hold && enable),
         .kp,
         .ki,
-        .kd                 (24'd0),
-        .kv                 (24'd0),
-        .ka                 (24'd0),
-        .output_limit       (limit),
-        .integral_limit     (limit),
-        .dead_band          (16'd0),
+        .limit,
         .gains_changed,
-        .filters_in_use     (4'd0),
-        .coefficient_write  (1'b0),
-        .coefficient_address(5'd0),
-        .coefficient        (32'sd0),
         .tick,
         .target,
-        .target_velocity    (32'sd0),
-        .target_acceleration(32'sd0),
-        .moving,
         .position,
-        .velocity           (32'sd0),
-        .open_command       (enable ? closer : 16'sd0),
-        .block_up           (!enable),
-        .block_down         (!enable),
+        .open_command(enable ? closer : 16'sd0),
         .valid,
-        .command,
-        .error,
-        .saturated          (clipped)
+        .command
     );
 
     assign saturated = hold && (command == highest || command == -highest);
-
-    wire unused = &{1'b0, error, clipped};
 endmodule
 
 `default_nettype wire

@@ -12,31 +12,28 @@
 `default_nettype none
 
 module step_permission (
-    input  wire               enable,           // level: the interlock enables the drive
-    input  wire               by_steps,         // level: the drive is a stepper driver
-    input  wire               block_up,         // level: the interlock blocks upward motion
-    input  wire               block_down,       // level: the interlock blocks downward motion
-    input  wire signed [31:0] target_velocity,  // 2^-16 period/tick
-    output logic              driven,           // level: the drive is on and is a stepper driver
-    output logic              allowed           // level: the target may be followed
+    input  wire  enable,       // level: the interlock enables the drive
+    input  wire  by_steps,     // level: the drive is a stepper driver
+    input  wire  block_up,     // level: the interlock blocks upward motion
+    input  wire  block_down,   // level: the interlock blocks downward motion
+    input  wire  target_up,    // level: the target moves up
+    input  wire  target_down,  // level: the target moves down
+    output logic allowed       // level: the target may be followed
 );
-    wire goes_down = target_velocity < 0;
-    wire goes_up = target_velocity > 0;
-    wire blocked = goes_down ? block_down : goes_up && block_up;
+    wire blocked = (target_down && block_down) || (target_up && block_up);
 
-    assign driven  = enable && by_steps;
-    assign allowed = driven && !blocked;
+    assign allowed = enable && by_steps && !blocked;
 
 `ifdef FORMAL
-    wire into_block = target_velocity != 0 && (target_velocity[31] ? block_down : block_up);
+    wire driven = enable && by_steps;
     always_comb begin
         assert (!allowed || (enable && by_steps));
-        assert (!(allowed && block_up && !target_velocity[31] && target_velocity != 0));
-        assert (!(allowed && block_down && target_velocity[31]));
-        assert (allowed || !enable || !by_steps || into_block);
-        assert (driven == (enable && by_steps));
-        cover (allowed && block_up && target_velocity == -1);
-        cover (!allowed && driven && target_velocity == 1);
+        assert (!(allowed && block_up && target_up));
+        assert (!(allowed && block_down && target_down));
+        if (driven && !target_up && !target_down) assert (allowed);
+        if (driven && !block_up && !block_down) assert (allowed);
+        cover (allowed && block_up && target_down);
+        cover (!allowed && driven && target_up);
     end
 `endif
 endmodule

@@ -5,12 +5,12 @@
 // latency   1 cycle from a cause to faults and to enabled low, and from command_in to command_out;
 //           2 cycles from a following error to enabled low.
 // behaviour Emergency stop, drive fault and CPU trap always latch. Limit switches (unless homing),
-//           encoder fault, bus watchdog, profile underrun, step overrun and following error latch
-//           while enable is requested. The following error counts from the second error_valid after
-//           enabled and closed_loop are both high, so that no error measured before then counts.
-//           reset_faults clears the faults whose cause is gone, and only while enable_request is
-//           low; nothing restarts by itself. A command that was made zero stays zero until the next
-//           command_in.
+//           encoder fault, bus watchdog, profile underrun, step overrun, servo overrun and
+//           following error latch while enable is requested. The following error counts from the
+//           second error_valid after enabled and closed_loop are both high, so that no error
+//           measured before then counts. reset_faults clears the faults whose cause is gone, and
+//           only while enable_request is low; nothing restarts by itself. A command that was made
+//           zero stays zero until the next command_in.
 // model     tb/interlock/drive_interlock.py, equal in every bit of every cycle
 // proved    Whatever the bus writes: enabled is never high with a latched fault, nor one cycle
 //           after a cause or without a request. A fault is cleared only by reset_faults with
@@ -35,42 +35,55 @@ module drive_interlock (
     input  wire                cpu_trap,          // level: the soft core has stopped
     input  wire                profile_underrun,  // strobe: the profile ran out of segments
     input  wire                step_overrun,      // level: the step generator lags too far
-    input  wire         [31:0] following_limit,   // 2^-16 period, largest |error|; 0: not checked
-    input  wire                error_valid,       // strobe: error is new
-    input  wire signed  [31:0] error,             // 2^-16 period, target - position
+    input  wire                servo_overrun,     // strobe: a tick came before the last was served
+    input  wire                error_valid,       // strobe: there is a new following error
+    input  wire                error_too_far,     // level: with error_valid, it is above its limit
     input  wire signed  [47:0] position,          // 2^-16 period
     input  wire                valid_in,          // strobe: command_in is new
     input  wire signed  [15:0] command_in,        // full scale 2^15
     output logic               valid_out,         // strobe: command_out is new or was made zero
     output logic signed [15:0] command_out,       // full scale 2^15
     output logic               enabled,           // level: the drive may be on
-    output logic        [ 9:0] faults,            // latched; bits as in axis_registers.faults
-    output logic        [ 9:0] causes_now,        // present causes, same bits as faults
-    output logic        [ 9:0] first_fault,       // the fault that came first, same bits as faults
+    output logic        [10:0] faults,            // latched; bits as in axis_registers.faults
+    output logic        [10:0] causes_now,        // present causes, same bits as faults
+    output logic        [10:0] first_fault,       // the fault that came first, same bits as faults
     output logic signed [47:0] fault_position,    // 2^-16 period, when first_fault latched
     output logic               block_up,          // level: no positive command passes
     output logic               block_down         // level: no negative command passes
 );
     // Of several causes in the same cycle, first_fault takes the lowest bit.
     // made by tables/interlock_faults.py, not to be edited
-    localparam [9:0] LATCH_ALWAYS = 10'b0011000100;  // estop, drive, cpu
+    localparam [10:0] LATCH_ALWAYS = 11'b00011000100;  // estop, drive, cpu
     // end of the made constants
 
     // the last error that counted was above the limit
-    logic too_far;
+    logic        too_far;
     // the next error was measured with the drive on
-    logic error_counts;
+    logic        error_counts;
 
-    wire [31:0] distance = error[31] ? -error : error;
-    wire [9:0] arrived = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
-    wire [9:0] held = reset_faults && !enable_request ? faults & causes_now : faults;
-    wire [9:0] latched = held | arrived;
-    wire allowed = enable_request && latched == '0;
+    wire  [10:0] arrived = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
+    wire  [10:0] held = reset_faults && !enable_request ? faults & causes_now : faults;
+    wire  [10:0] latched = held | arrived;
+    wire         allowed = enable_request && latched == '0;
 
-    wire signed [15:0] command = valid_in ? command_in : command_out;
-    wire blocked = !allowed || (limit_high && command > 0) || (limit_low && command < 0);
+    // command_out is positive, negative; so is the command of this cycle
+    logic positive, negative;
+    wire         up = valid_in ? !command_in[15] && command_in != '0 : positive;
+    wire         down = valid_in ? command_in[15] : negative;
+    wire         blocked = !allowed || (limit_high && up) || (limit_low && down);
+
+    logic [10:0] lowest;  // of the causes that have arrived
+    logic        lower;
+    always_comb begin
+        lower = 1'b0;
+        for (int n = 0; n < 11; n++) begin
+            lowest[n] = arrived[n] && !lower;
+            lower     = lower || arrived[n];
+        end
+    end
 
     assign causes_now = {
+        servo_overrun,
         step_overrun,
         profile_underrun,
         cpu_trap,
@@ -86,23 +99,25 @@ module drive_interlock (
     assign block_down = limit_low || !enabled;
 
     always_ff @(posedge clk) begin
-        if (!enabled || !closed_loop || following_limit == '0) begin
+        if (!enabled || !closed_loop) begin
             too_far      <= 1'b0;
             error_counts <= 1'b0;
         end else if (error_valid) begin
-            too_far      <= error_counts && distance > following_limit;
+            too_far      <= error_counts && error_too_far;
             error_counts <= 1'b1;
         end
 
         faults  <= latched;
         enabled <= allowed;
         if (held == '0) begin
-            first_fault <= arrived & (~arrived + 1'b1);
+            first_fault <= lowest;
             if (arrived != '0) fault_position <= position;
         end
 
-        command_out <= blocked ? '0 : command;
-        valid_out   <= valid_in || (blocked && command_out != '0);
+        if (valid_in) command_out <= command_in;
+        {positive, negative} <= {up, down};
+        if (blocked) {command_out, positive, negative} <= '0;
+        valid_out <= valid_in || (blocked && (positive || negative));
         if (rst) begin
             too_far        <= 1'b0;
             error_counts   <= 1'b0;
@@ -111,6 +126,7 @@ module drive_interlock (
             first_fault    <= '0;
             fault_position <= '0;
             command_out    <= '0;
+            {positive, negative} <= '0;
             valid_out      <= 1'b0;
         end
     end
@@ -121,6 +137,7 @@ module drive_interlock (
         past <= 1'b1;
         if (!past) assume (rst);
         if (past) begin
+            assert (positive == (command_out > 0) && negative == (command_out < 0));
             assert (!(enabled && faults != '0));
             assert (!enabled || ($past(enable_request) && $past(causes_now) == '0));
             assert (command_out == '0 || enabled);

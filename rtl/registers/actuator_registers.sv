@@ -22,7 +22,6 @@ module actuator_registers #(
     input  wire                write,                      // level: it writes wdata
     input  wire         [ 5:0] word,                       // index of the word
     input  wire         [31:0] wdata,                      // value to write
-    input  wire         [31:0] wdata_low,                  // low word, held by register_memory
     output logic        [31:0] rdata,                      // live bits read; else 0
     output logic        [ 1:0] drive,                      // kind of drive
     output logic        [15:0] pwm_period,                 // PWM period of the bridge [cycle]
@@ -33,8 +32,6 @@ module actuator_registers #(
     output logic        [ 1:0] step_output_mode,           // 0 step and direction
     output logic               step_output_step_low,       // 1: step is active low
     output logic               step_output_direction_low,  // 1: direction is low going up
-    output logic        [ 3:0] step_output_trim,           // shift of the command
-    output logic signed [47:0] step_ratio,                 // steps in one period, 2^-32 step/period
     input  wire signed  [31:0] steps,                      // steps sent since reset [step]
     output logic        [ 7:0] dac_half_period,            // half a period of its clock, cycle
     output logic        [15:0] dac_refresh,                // cycle
@@ -71,8 +68,6 @@ module actuator_registers #(
         if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_mode <= wdata[1:0];
         if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_step_low <= wdata[2];
         if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_direction_low <= wdata[3];
-        if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_trim <= wdata[7:4];
-        if (HAS_STEPPER != 0 && put && word == 6'h07) step_ratio <= {wdata[15:0], wdata_low};
         if (HAS_DAC != 0 && put && word == 6'h09) dac_half_period <= wdata[7:0];
         if (HAS_DAC != 0 && put && word == 6'h09) dac_refresh <= wdata[23:8];
         if (HAS_DAC != 0 && put && word == 6'h0A) dac_trim <= wdata[15:0];
@@ -93,8 +88,6 @@ module actuator_registers #(
             step_output_mode <= 2'h0;
             step_output_step_low <= 1'b0;
             step_output_direction_low <= 1'b0;
-            step_output_trim <= 4'h0;
-            step_ratio <= 48'h000000000000;
             dac_half_period <= HAS_DAC == 0 ? '0 : 8'h01;
             dac_refresh <= HAS_DAC == 0 ? '0 : 16'hFFFF;
             dac_trim <= 16'h0000;

@@ -10,7 +10,6 @@
 `default_nettype none
 
 module axis_registers #(
-    parameter int FILTERS     = 1,  // 0: settings that need it read 0
     parameter int HAS_DRIVE   = 1,  // 0: settings that need it read 0
     parameter int HAS_MONITOR = 1   // 0: settings that need it read 0
 ) (
@@ -20,7 +19,6 @@ module axis_registers #(
     input  wire                write,                           // level: it writes wdata
     input  wire         [ 5:0] word,                            // index of the word
     input  wire         [31:0] wdata,                           // value to write
-    input  wire         [31:0] wdata_low,                       // low word, held by register_memory
     output logic        [31:0] rdata,                           // live bits read; else 0
     output logic               control_enable,                  // requests the drive
     output logic               control_closed_loop,             // 1
@@ -41,11 +39,10 @@ module axis_registers #(
     input  wire         [ 4:0] state_queue_free,                // segments that can be queued
     input  wire                state_armed,                     // a profile waits for start_at
     input  wire                state_fine_saturated,            // fine stage at its limit
-    input  wire         [ 9:0] faults,                          // latched faults
-    input  wire         [ 9:0] causes_now,                      // causes present now
-    input  wire         [ 9:0] first_fault,                     // cause that came first
+    input  wire         [10:0] faults,                          // latched faults
+    input  wire         [10:0] causes_now,                      // causes present now
+    input  wire         [10:0] first_fault,                     // cause that came first
     input  wire signed  [47:0] fault_position,                  // 1/65536 period
-    output logic        [31:0] following_limit,                 // 1/65536 period
     input  wire signed  [47:0] position,                        // position [1/65536 period]
     input  wire signed  [47:0] target,                          // 1/65536 period
     input  wire signed  [31:0] velocity,                        // velocity [1/65536 period/tick]
@@ -53,7 +50,7 @@ module axis_registers #(
     output logic               shift_origin_written,            // strobe: new value
     input  wire                zero_crossing_up,                // strobe: crossed going up
     input  wire                zero_crossing_down,              // strobe: crossed going down
-    output logic        [15:0] sensing_deglitch,                // time that a, cycle
+    output logic        [ 5:0] sensing_deglitch,                // samples in a row that a, sample
     output logic               sensing_written,                 // strobe: new value
     output logic        [15:0] amplitude_window_low,            // amplitude window
     output logic        [15:0] amplitude_window_high,           // amplitude window
@@ -73,7 +70,8 @@ module axis_registers #(
     input  wire                built_recorder,                  // HAS_RECORDER
     input  wire                built_capture,                   // HAS_CAPTURE
     input  wire                built_compare,                   // HAS_COMPARE: compare pulses
-    input  wire                built_velocity,                  // HAS_VELOCITY: velocity estimator
+    input  wire                built_encoder_check,             // HAS_ENCODER_CHECK
+    input  wire                built_velocity,                  // HAS_VELOCITY: measured velocity
     input  wire                built_drive,                     // HAS_DRIVE
     input  wire                built_bridge,                    // HAS_BRIDGE: bridge
     input  wire                built_stepper,                   // HAS_STEPPER: step generator
@@ -81,38 +79,8 @@ module axis_registers #(
     input  wire                built_fine_stage,                // HAS_FINE_STAGE: fine stage
     input  wire         [ 2:0] built_filters,                   // FILTERS
     input  wire         [ 7:0] built_segments,                  // SEGMENTS
-    output logic        [23:0] kp,                              // 1/65536 command/(period/65536)
-    output logic               kp_written,                      // strobe: new value
-    output logic        [23:0] ki,                              // 1/16777216 command/(period/65536)
-    output logic        [23:0] kd,                              // derivative gain
-    output logic               kd_written,                      // strobe: new value
-    output logic        [23:0] kv,                              // velocity feed-forward
-    output logic               kv_written,                      // strobe: new value
-    output logic        [23:0] ka,                              // acceleration feed-forward
-    output logic               ka_written,                      // strobe: new value
-    output logic        [14:0] servo_limits_output,             // largest |command|
-    output logic        [14:0] servo_limits_integral,           // largest |integral term|
-    output logic        [15:0] dead_band,                       // dead band, 1/65536 period
     input  wire signed  [31:0] following_error,                 // target - position, 1/65536 period
-    input  wire signed  [15:0] command,                         // command to the drive
-    output logic signed [15:0] open_command,                    // command while closed_loop = 0
-    output logic        [ 3:0] filters_in_use,                  // bit n
-    output logic        [ 4:0] filters_address,                 // section * 8 + coefficient
-    output logic signed [31:0] filter_coefficient,              // coefficient
-    output logic               filter_coefficient_written,      // strobe: new value
-    output logic signed [63:0] segment_velocity,                // 2^-40 period/tick
-    output logic signed [63:0] segment_acceleration,            // 2^-40 period/tick2
-    output logic signed [31:0] segment_jerk,                    // 2^-40 period/tick3
-    output logic        [23:0] segment_ticks,                   // duration of the segment, tick
-    output logic               segment_ticks_last,              // 1
-    output logic               segment_ticks_written,           // strobe: new value
-    output logic        [31:0] stop_deceleration,               // 2^-32 period/tick2
-    output logic        [31:0] stop_jerk,                       // 2^-40 period/tick3
-    output logic        [16:0] feed_override_fraction,          // fraction of full speed
-    output logic               feed_override_pause,             // 1: pause inside the profile
-    output logic        [31:0] feed_override_slope,             // 2^-32 1/tick
-    output logic        [31:0] feed_override_curve,             // 2^-32 1/tick2
-    output logic        [31:0] start_at                         // cycle
+    input  wire signed  [15:0] command                          // command to the drive
 );
     logic [ 5:0] encoder_events_held;
     logic [15:0] fault_position_high;
@@ -120,10 +88,10 @@ module axis_registers #(
     logic [15:0] target_high;
     logic        zero_crossing_up_held;
     logic        zero_crossing_down_held;
-    logic [31:0] rejected_pulses_count;
-    wire  [32:0] rejected_pulses_next = {1'b0, rejected_pulses_count} + 33'(rejected_pulses);
-    logic [31:0] rejected_samples_count;
-    wire  [32:0] rejected_samples_next = {1'b0, rejected_samples_count} + 33'(rejected_samples);
+    logic [15:0] rejected_pulses_count;
+    wire  [16:0] rejected_pulses_next = {1'b0, rejected_pulses_count} + 17'(rejected_pulses);
+    logic [15:0] rejected_samples_count;
+    wire  [16:0] rejected_samples_next = {1'b0, rejected_samples_count} + 17'(rejected_samples);
     logic        get_state;
     logic        get_faults;
     logic        get_causes_now;
@@ -152,8 +120,8 @@ module axis_registers #(
     // words read in the cycle before
     assign rdata = ({32{get_state}} & {18'd0, state_fine_saturated, state_armed, state_queue_free,
         state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
-        state_limit_low, state_enabled}) | ({32{get_faults}} & {22'd0, faults}) |
-        ({32{get_causes_now}} & {22'd0, causes_now}) | ({32{get_first_fault}} & {22'd0,
+        state_limit_low, state_enabled}) | ({32{get_faults}} & {21'd0, faults}) |
+        ({32{get_causes_now}} & {21'd0, causes_now}) | ({32{get_first_fault}} & {21'd0,
         first_fault}) | ({32{get_fault_position}} & fault_position[31:0]) |
         ({32{get_fault_position_high}} & {16'd0, fault_position_high}) | ({32{get_position}} &
         position[31:0]) | ({32{get_position_high}} & {16'd0, position_high}) | ({32{get_target}} &
@@ -162,11 +130,12 @@ module axis_registers #(
         zero_crossing_up_held}) | ({32{get_sample}} & {sample_cos, sample_sin}) | ({32{get_phase}} &
         {phase_amplitude, phase_phase}) | ({32{get_quadrature_count}} & quadrature_count) |
         ({32{get_encoder_events}} & {26'd0, encoder_events_held}) | ({32{get_rejected_pulses}} &
-        rejected_pulses_count) | ({32{get_rejected_samples}} & rejected_samples_count) |
-        ({32{get_built}} & {9'd0, built_segments, built_filters, built_fine_stage, built_dac,
-        built_stepper, built_bridge, built_drive, built_velocity, built_compare, built_capture,
-        built_recorder, built_harmonics, built_monitor, built_sine}) | ({32{get_following_error}} &
-        following_error) | ({32{get_command}} & {16'd0, command}) | {{16{(get_fault_position_high &&
+        {16'd0, rejected_pulses_count}) | ({32{get_rejected_samples}} & {16'd0,
+        rejected_samples_count}) | ({32{get_built}} & {8'd0, built_segments, built_filters,
+        built_fine_stage, built_dac, built_stepper, built_bridge, built_drive, built_velocity,
+        built_encoder_check, built_compare, built_capture, built_recorder, built_harmonics,
+        built_monitor, built_sine}) | ({32{get_following_error}} & following_error) |
+        ({32{get_command}} & {16'd0, command}) | {{16{(get_fault_position_high &&
         fault_position_high[15]) || (get_position_high && position_high[15]) || (get_target_high &&
         target_high[15]) || (get_command && command[15])}}, 16'd0};
 
@@ -205,15 +174,14 @@ module axis_registers #(
         strobes_start <= put && word == 6'h01 && wdata[2];
         strobes_controlled_stop <= put && word == 6'h01 && wdata[3];
         strobes_arm <= put && word == 6'h01 && wdata[4];
-        if (HAS_DRIVE != 0 && put && word == 6'h08) following_limit <= wdata[31:0];
         shift_origin_written <= put && word == 6'h0F;
-        if (put && word == 6'h0F) shift_origin <= wdata[31:0];
+        shift_origin <= put && word == 6'h0F ? wdata[31:0] : '0;
         zero_crossing_up_held <= zero_crossing_up || (zero_crossing_up_held && !(put && word ==
             6'h10 && wdata[0]));
         zero_crossing_down_held <= zero_crossing_down || (zero_crossing_down_held && !(put && word
             == 6'h10 && wdata[1]));
         sensing_written <= put && word == 6'h11;
-        if (put && word == 6'h11) sensing_deglitch <= wdata[15:0];
+        if (put && word == 6'h11) sensing_deglitch <= wdata[5:0];
         if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_low <= wdata[15:0];
         if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_high <= wdata[31:16];
         disagreement_limit_written <= put && word == 6'h13;
@@ -230,40 +198,10 @@ module axis_registers #(
         encoder_events_held[5] <= encoder_events[5] || (encoder_events_held[5] && !(put && word ==
             6'h17 && wdata[5]));
         if (put && word == 6'h18) encoder_fault_mask <= wdata[5:0];
-        if (put && word == 6'h19) rejected_pulses_count <= 32'(rejected_pulses);
-        else if (!rejected_pulses_next[32]) rejected_pulses_count <= rejected_pulses_next[31:0];
-        if (put && word == 6'h1A) rejected_samples_count <= 32'(rejected_samples);
-        else if (!rejected_samples_next[32]) rejected_samples_count <= rejected_samples_next[31:0];
-        kp_written <= put && word == 6'h20;
-        if (HAS_DRIVE != 0 && put && word == 6'h20) kp <= wdata[23:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h21) ki <= wdata[23:0];
-        kd_written <= put && word == 6'h22;
-        if (HAS_DRIVE != 0 && put && word == 6'h22) kd <= wdata[23:0];
-        kv_written <= put && word == 6'h23;
-        if (HAS_DRIVE != 0 && put && word == 6'h23) kv <= wdata[23:0];
-        ka_written <= put && word == 6'h24;
-        if (HAS_DRIVE != 0 && put && word == 6'h24) ka <= wdata[23:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h25) servo_limits_output <= wdata[14:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h25) servo_limits_integral <= wdata[29:15];
-        if (HAS_DRIVE != 0 && put && word == 6'h26) dead_band <= wdata[15:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h29) open_command <= wdata[15:0];
-        if (FILTERS != 0 && put && word == 6'h2A) filters_in_use <= wdata[3:0];
-        if (FILTERS != 0 && put && word == 6'h2A) filters_address <= wdata[8:4];
-        filter_coefficient_written <= put && word == 6'h2B;
-        if (FILTERS != 0 && put && word == 6'h2B) filter_coefficient <= wdata[31:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h2D) segment_velocity <= {wdata, wdata_low};
-        if (HAS_DRIVE != 0 && put && word == 6'h2F) segment_acceleration <= {wdata, wdata_low};
-        if (HAS_DRIVE != 0 && put && word == 6'h30) segment_jerk <= wdata[31:0];
-        segment_ticks_written <= put && word == 6'h31;
-        if (HAS_DRIVE != 0 && put && word == 6'h31) segment_ticks <= wdata[23:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h31) segment_ticks_last <= wdata[24];
-        if (HAS_DRIVE != 0 && put && word == 6'h32) stop_deceleration <= wdata[31:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h33) stop_jerk <= wdata[31:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h34) feed_override_fraction <= wdata[16:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h34) feed_override_pause <= wdata[17];
-        if (HAS_DRIVE != 0 && put && word == 6'h35) feed_override_slope <= wdata[31:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h36) feed_override_curve <= wdata[31:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h37) start_at <= wdata[31:0];
+        if (put && word == 6'h19) rejected_pulses_count <= 16'(rejected_pulses);
+        else if (!rejected_pulses_next[16]) rejected_pulses_count <= rejected_pulses_next[15:0];
+        if (put && word == 6'h1A) rejected_samples_count <= 16'(rejected_samples);
+        else if (!rejected_samples_next[16]) rejected_samples_count <= rejected_samples_next[15:0];
 
         if (rst) begin
             get_state <= 1'b0;
@@ -297,7 +235,6 @@ module axis_registers #(
             strobes_controlled_stop <= 1'b0;
             strobes_arm <= 1'b0;
             fault_position_high <= '0;
-            following_limit <= 32'h00000000;
             position_high <= '0;
             target_high <= '0;
             shift_origin_written <= 1'b0;
@@ -305,7 +242,7 @@ module axis_registers #(
             zero_crossing_up_held <= '0;
             zero_crossing_down_held <= '0;
             sensing_written <= 1'b0;
-            sensing_deglitch <= 16'h0010;
+            sensing_deglitch <= 6'h10;
             amplitude_window_low <= 16'h0000;
             amplitude_window_high <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
             disagreement_limit_written <= 1'b0;
@@ -318,36 +255,6 @@ module axis_registers #(
             encoder_fault_mask <= 6'h00;
             rejected_pulses_count <= '0;
             rejected_samples_count <= '0;
-            kp_written <= 1'b0;
-            kp <= 24'h000000;
-            ki <= 24'h000000;
-            kd_written <= 1'b0;
-            kd <= 24'h000000;
-            kv_written <= 1'b0;
-            kv <= 24'h000000;
-            ka_written <= 1'b0;
-            ka <= 24'h000000;
-            servo_limits_output <= 15'h0000;
-            servo_limits_integral <= 15'h0000;
-            dead_band <= 16'h0000;
-            open_command <= 16'h0000;
-            filters_in_use <= 4'h0;
-            filters_address <= 5'h00;
-            filter_coefficient_written <= 1'b0;
-            filter_coefficient <= 32'h00000000;
-            segment_velocity <= 64'h0000000000000000;
-            segment_acceleration <= 64'h0000000000000000;
-            segment_jerk <= 32'h00000000;
-            segment_ticks_written <= 1'b0;
-            segment_ticks <= 24'h000000;
-            segment_ticks_last <= 1'b0;
-            stop_deceleration <= HAS_DRIVE == 0 ? '0 : 32'hFFFFFFFF;
-            stop_jerk <= 32'h00000000;
-            feed_override_fraction <= HAS_DRIVE == 0 ? '0 : 17'h10000;
-            feed_override_pause <= 1'b0;
-            feed_override_slope <= 32'h00000000;
-            feed_override_curve <= 32'h00000000;
-            start_at <= 32'h00000000;
         end
     end
 endmodule

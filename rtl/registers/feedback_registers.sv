@@ -11,11 +11,11 @@
 `default_nettype none
 
 module feedback_registers #(
-    parameter int HAS_COMPARE   = 1,  // 0: settings that need it read 0
-    parameter int HAS_HARMONICS = 1,  // 0: settings that need it read 0
-    parameter int HAS_MONITOR   = 1,  // 0: settings that need it read 0
-    parameter int HAS_RECORDER  = 1,  // 0: settings that need it read 0
-    parameter int HAS_VELOCITY  = 1   // 0: settings that need it read 0
+    parameter int HAS_COMPARE       = 1,  // 0: settings that need it read 0
+    parameter int HAS_ENCODER_CHECK = 1,  // 0: settings that need it read 0
+    parameter int HAS_HARMONICS     = 1,  // 0: settings that need it read 0
+    parameter int HAS_MONITOR       = 1,  // 0: settings that need it read 0
+    parameter int HAS_RECORDER      = 1   // 0: settings that need it read 0
 ) (
     input wire clk,
     input wire rst,  // settings take their first values
@@ -90,8 +90,6 @@ module feedback_registers #(
     input wire compare_state_armed,  // state of compare: armed
     input wire compare_state_late,  // strobe
     input wire [31:0] compare_passed,  // points passed
-    output logic [15:0] velocity_quantum,  // 1/65536 period
-    input wire signed [39:0] velocity_fine,  // 2^-24 period/tick
     output logic position_source_counts,  // 1
     output logic position_source_steps,  // 1
     output logic signed [2:0] align,  // 1/4 period
@@ -118,7 +116,6 @@ module feedback_registers #(
     logic        capture_state_overrun_held;
     logic [15:0] captured_position_high;
     logic        compare_state_late_held;
-    logic [ 7:0] velocity_fine_high;
     logic        get_index_events;
     logic        get_index_count;
     logic        get_edge_time;
@@ -133,8 +130,6 @@ module feedback_registers #(
     logic        get_captured_position_high;
     logic        get_compare_state;
     logic        get_compare_passed;
-    logic        get_velocity_fine;
-    logic        get_velocity_fine_high;
     logic        get_segment_state;
     logic        get_segment_stored;
     logic        get_segment_error;
@@ -155,14 +150,12 @@ module feedback_registers #(
         captured_time) | ({32{get_captured_position}} & captured_position[31:0]) |
         ({32{get_captured_position_high}} & {16'd0, captured_position_high}) |
         ({32{get_compare_state}} & {30'd0, compare_state_late_held, compare_state_armed}) |
-        ({32{get_compare_passed}} & compare_passed) | ({32{get_velocity_fine}} &
-        velocity_fine[31:0]) | ({32{get_velocity_fine_high}} & {24'd0, velocity_fine_high}) |
-        ({32{get_segment_state}} & {29'd0, segment_state_known, segment_state_outside,
-        segment_state_in_force}) | ({32{get_segment_stored}} & {8'd0, segment_stored}) |
-        ({32{get_segment_error}} & {8'd0, segment_error}) | {{8{(get_segment_stored &&
-        segment_stored[23]) || (get_segment_error && segment_error[23])}}, 24'd0} |
-        {{16{(get_captured_position_high && captured_position_high[15])}}, 16'd0} |
-        {{24{(get_velocity_fine_high && velocity_fine_high[7])}}, 8'd0};
+        ({32{get_compare_passed}} & compare_passed) | ({32{get_segment_state}} & {29'd0,
+        segment_state_known, segment_state_outside, segment_state_in_force}) |
+        ({32{get_segment_stored}} & {8'd0, segment_stored}) | ({32{get_segment_error}} & {8'd0,
+        segment_error}) | {{8{(get_segment_stored && segment_stored[23]) || (get_segment_error &&
+        segment_error[23])}}, 24'd0} | {{16{(get_captured_position_high &&
+        captured_position_high[15])}}, 16'd0};
 
     always_ff @(posedge clk) begin
         get_index_events <= get && word == 6'h05;
@@ -179,13 +172,10 @@ module feedback_registers #(
         get_captured_position_high <= get && word == 6'h1D;
         get_compare_state <= get && word == 6'h25;
         get_compare_passed <= get && word == 6'h26;
-        get_velocity_fine <= get && word == 6'h28;
-        get_velocity_fine_high <= get && word == 6'h29;
         get_segment_state <= get && word == 6'h2D;
         get_segment_stored <= get && word == 6'h34;
         get_segment_error <= get && word == 6'h35;
         if (get_captured_position) captured_position_high <= captured_position[47:32];
-        if (get_velocity_fine) velocity_fine_high <= velocity_fine[39:32];
 
         if (put && word == 6'h00) edge_filter_skip <= wdata[15:0];
         if (put && word == 6'h00) edge_filter_tolerated <= wdata[19:16];
@@ -196,7 +186,7 @@ module feedback_registers #(
         if (put && word == 6'h02) index_up <= wdata[5];
         if (put && word == 6'h02) index_down <= wdata[6];
         if (put && word == 6'h02) index_each <= wdata[7];
-        if (put && word == 6'h03) counts_per_revolution <= wdata[31:0];
+        if (HAS_ENCODER_CHECK != 0 && put && word == 6'h03) counts_per_revolution <= wdata[31:0];
         strobes_arm_index <= put && word == 6'h04 && wdata[0];
         strobes_load_correction <= put && word == 6'h04 && wdata[1];
         strobes_swap_harmonics <= put && word == 6'h04 && wdata[2];
@@ -241,11 +231,10 @@ module feedback_registers #(
         if (HAS_COMPARE != 0 && put && word == 6'h24) compare_gap <= wdata[23:0];
         compare_state_late_held <= compare_state_late || (compare_state_late_held && !(put && word
             == 6'h25 && wdata[1]));
-        if (HAS_VELOCITY != 0 && put && word == 6'h27) velocity_quantum <= wdata[15:0];
         if (put && word == 6'h2A) position_source_counts <= wdata[0];
         if (put && word == 6'h2A) position_source_steps <= wdata[1];
         align_written <= put && word == 6'h2B;
-        if (put && word == 6'h2B) align <= wdata[2:0];
+        align <= put && word == 6'h2B ? wdata[2:0] : '0;
         if (put && word == 6'h2C) segment_use_enable <= wdata[0];
         if (put && word == 6'h2C) segment_use_linear <= wdata[1];
         if (put && word == 6'h2C) segment_use_segments <= wdata[9:2];
@@ -273,8 +262,6 @@ module feedback_registers #(
             get_captured_position_high <= 1'b0;
             get_compare_state <= 1'b0;
             get_compare_passed <= 1'b0;
-            get_velocity_fine <= 1'b0;
-            get_velocity_fine_high <= 1'b0;
             get_segment_state <= 1'b0;
             get_segment_stored <= 1'b0;
             get_segment_error <= 1'b0;
@@ -327,8 +314,6 @@ module feedback_registers #(
             compare_pulse <= HAS_COMPARE == 0 ? '0 : 24'h000001;
             compare_gap <= HAS_COMPARE == 0 ? '0 : 24'h000001;
             compare_state_late_held <= '0;
-            velocity_quantum <= 16'h0000;
-            velocity_fine_high <= '0;
             position_source_counts <= 1'b0;
             position_source_steps <= 1'b0;
             align_written <= 1'b0;

@@ -18,6 +18,7 @@ module register_layout #(
     parameter int HAS_COMPARE = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_DAC = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_DRIVE = 255,  // bit n: axis n has it, else its settings are 0
+    parameter int HAS_ENCODER_CHECK = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_FINE_STAGE = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_HARMONICS = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_MONITOR = 255,  // bit n: axis n has it, else its settings are 0
@@ -51,6 +52,7 @@ module register_layout #(
     wire               has_compare = 1'(HAS_COMPARE >> axis);
     wire               has_dac = 1'(HAS_DAC >> axis);
     wire               has_drive = 1'(HAS_DRIVE >> axis);
+    wire               has_encoder_check = 1'(HAS_ENCODER_CHECK >> axis);
     wire               has_fine_stage = 1'(HAS_FINE_STAGE >> axis);
     wire               has_harmonics = 1'(HAS_HARMONICS >> axis);
     wire               has_monitor = 1'(HAS_MONITOR >> axis);
@@ -113,22 +115,23 @@ module register_layout #(
             9'h007, 9'h04C, 9'h084, 9'h099: mask = 32'h0000FFFF;
             9'h040, 9'h08A, 9'h08F, 9'h100: mask = 32'h000FFFFF;
             9'h050, 9'h102: mask = 32'h000000FF;
-            9'h091, 9'h0CF, 9'h103: mask = 32'hFFFFFFFF;
+            9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
             9'h0C0: mask = (has_drive ? 32'h0000000F : 32'd0);
             9'h0C8, 9'h0ED, 9'h0EF, 9'h0F0, 9'h0F2, 9'h0F3, 9'h0F5, 9'h0F6, 9'h0F7: mask =
                 (has_drive ? 32'hFFFFFFFF : 32'd0);
-            9'h0D1: mask = 32'h0000FFFF | (has_sine ? 32'hFFFF0000 : 32'd0);
+            9'h0D1: mask = 32'h0000003F | (has_sine ? 32'hFFFF0000 : 32'd0);
             9'h0D2, 9'h113, 9'h114, 9'h116, 9'h117: mask = (has_monitor ? 32'hFFFFFFFF : 32'd0);
             9'h0D3: mask = (has_sine ? 32'h000FFFFF : 32'd0);
             9'h0D8: mask = 32'h0000003F;
+            9'h0DC, 9'h0E5: mask = (has_drive ? 32'h00007FFF : 32'd0);
             9'h0E0, 9'h0E1, 9'h0E2, 9'h0E3, 9'h0E4: mask = (has_drive ? 32'h00FFFFFF : 32'd0);
-            9'h0E5: mask = (has_drive ? 32'h3FFFFFFF : 32'd0);
             9'h0E6, 9'h0E9: mask = (has_drive ? 32'h0000FFFF : 32'd0);
-            9'h0EA: mask = (filters ? 32'h000001FF : 32'd0);
+            9'h0EA: mask = (filters ? 32'h0000001F : 32'd0);
             9'h0EB: mask = (filters ? 32'hFFFFFFFF : 32'd0);
             9'h0F1: mask = (has_drive ? 32'h01FFFFFF : 32'd0);
-            9'h0F4: mask = (has_drive ? 32'h0003FFFF : 32'd0);
+            9'h0F4: mask = (has_drive ? 32'h0001FFFF : 32'd0);
             9'h101, 9'h12A, 9'h140: mask = 32'h00000003;
+            9'h103: mask = (has_encoder_check ? 32'hFFFFFFFF : 32'd0);
             9'h108: mask = (has_sine ? 32'hFFFFFFFF : 32'd0);
             9'h109, 9'h10A: mask = (has_sine ? 32'h0001FFFF : 32'd0);
             9'h10B: mask = (has_harmonics ? 32'h00000001 : 32'd0);
@@ -144,8 +147,8 @@ module register_layout #(
             9'h12B: mask = 32'h00000007;
             9'h141: mask = (has_bridge ? 32'h0000FFFF : 32'd0);
             9'h142, 9'h143: mask = (has_stepper ? 32'h0FFFFFFF : 32'd0);
-            9'h144: mask = (has_stepper ? 32'h000000FF : 32'd0);
-            9'h147: mask = (has_stepper ? 32'h0000FFFF : 32'd0);
+            9'h144: mask = (has_stepper ? 32'h0000000F : 32'd0);
+            9'h145, 9'h147: mask = (has_stepper ? 32'h0000FFFF : 32'd0);
             9'h149: mask = (has_dac ? 32'h00FFFFFF : 32'd0);
             9'h14A: mask = (has_dac ? 32'h0000FFFF : 32'd0);
             9'h14C, 9'h14D: mask = (has_fine_stage ? 32'h00FFFFFF : 32'd0);
@@ -179,6 +182,7 @@ module register_layout #(
             9'h114, 9'h115: first = (has_monitor ? 32'h0000FFFF : 32'd0);
             9'h123, 9'h124: first = (has_compare ? 32'h00000001 : 32'd0);
             9'h142, 9'h143: first = (has_stepper ? 32'h00004001 : 32'd0);
+            9'h145: first = (has_stepper ? 32'h00000001 : 32'd0);
             9'h149: first = (has_dac ? 32'h00FFFF01 : 32'd0);
             default: first = '0;
         endcase

@@ -1,46 +1,54 @@
 // SPDX-License-Identifier: Apache-2.0
-// register_memory -- holds the settings of all register blocks for reading back, and the low word of
-// a setting of 64 bits until its high word is written.
+// register_memory -- holds the settings of all register blocks for reading back, and the low word
+// of a setting of 64 bits until its high word is written.
 //
-// latency   1 cycle from select to rdata and to wdata_low; 2048 cycles from the end of rst to ready
+// latency   1 cycle from select to rdata and to wdata_low; 2048 cycles without hold from the end of
+//           rst to ready
 // rate      one access every 2 cycles
-// behaviour After rst each setting gets its first value, one word per cycle; until ready is high
-//           there must be no access. A write of a low word changes wdata_low only; the write of the
-//           high word stores both. There is one wdata_low for all blocks.
+// behaviour After rst each setting gets its first value, one word in each cycle without hold; until
+//           ready is high there must be no access. stores shows every setting that is written, its
+//           first value too; of a value of 64 bits with its high word. A write of a low word
+//           changes wdata_low only; the write of the high word stores both. There is one wdata_low
+//           for all blocks.
 // source    register_layout: the layout of the memory, the bits of each setting, the first values
 // model     tb/registers/register_memory.py, equal in every bit of every cycle
 // proved    A read of any word gives what the last write of the word stored, else its first value;
 //           no access to another word changes it. The low word of a setting of 64 bits reads what
 //           was written before the last write of its high word.
-// limits    The settings that need what an axis has not read 0: the HAS_... parameters and FILTERS are
-//           masks, bit n for axis n.
+// limits    The settings that need what an axis has not read 0: the HAS_... parameters and FILTERS
+//           are masks, bit n for axis n.
 // proof     depth 4, AXES = 2
 `default_nettype none
 
 module register_memory #(
-    parameter int AXES           = 1,    // axes of the node, 1 to 8
-    parameter int FILTERS        = 255,  // bit n: axes with biquads of the servo
-    parameter int HAS_BRIDGE     = 255,  // axes with a bridge
-    parameter int HAS_COMPARE    = 255,  // axes with compare
-    parameter int HAS_DAC        = 255,  // axes with a DAC
-    parameter int HAS_DRIVE      = 255,  // axes with a drive
-    parameter int HAS_FINE_STAGE = 255,  // axes with a fine stage
-    parameter int HAS_HARMONICS  = 255,  // axes with harmonic correction
-    parameter int HAS_MONITOR    = 255,  // axes with a signal monitor
-    parameter int HAS_RECORDER   = 255,  // axes with a recorder
-    parameter int HAS_SINE       = 255,  // axes with sine and cosine
-    parameter int HAS_STEPPER    = 255,  // axes with a step generator
-    parameter int HAS_VELOCITY   = 255   // axes with a velocity estimator
+    parameter int AXES              = 1,    // axes of the node, 1 to 8
+    parameter int FILTERS           = 255,  // bit n: axes with biquads of the servo
+    parameter int HAS_BRIDGE        = 255,  // axes with a bridge
+    parameter int HAS_COMPARE       = 255,  // axes with compare
+    parameter int HAS_DAC           = 255,  // axes with a DAC
+    parameter int HAS_DRIVE         = 255,  // axes with a drive
+    parameter int HAS_ENCODER_CHECK = 255,  // axes with the check of the encoder
+    parameter int HAS_FINE_STAGE    = 255,  // axes with a fine stage
+    parameter int HAS_HARMONICS     = 255,  // axes with harmonic correction
+    parameter int HAS_MONITOR       = 255,  // axes with a signal monitor
+    parameter int HAS_RECORDER      = 255,  // axes with a recorder
+    parameter int HAS_SINE          = 255,  // axes with sine and cosine
+    parameter int HAS_STEPPER       = 255,  // axes with a step generator
+    parameter int HAS_VELOCITY      = 255   // axes with a measured velocity
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire         select,    // strobe: an access to any block
-    input  wire         write,     // level: it writes wdata
-    input  wire  [13:0] address,   // word of the register map
-    input  wire  [31:0] wdata,     // value to write
-    output logic        ready,     // level: the settings have their first values
-    output logic [31:0] rdata,     // settings in the word read last; its other bits are 0
-    output logic [31:0] wdata_low  // low word that waits for its high word
+    input  wire         hold,         // level: no first value is stored
+    input  wire         select,       // strobe: an access to any block
+    input  wire         write,        // level: it writes wdata
+    input  wire  [13:0] address,      // word of the register map
+    input  wire  [31:0] wdata,        // value to write
+    output logic        ready,        // level: the settings have their first values
+    output logic [31:0] rdata,        // settings in the word read last; its other bits are 0
+    output logic [31:0] wdata_low,    // low word that waits for its high word
+    output logic        stores,       // strobe: a word is stored
+    output logic [13:0] stored_at,    // word of the register map
+    output logic [31:0] stored_value  // bits of its settings
 );
     localparam int W = $clog2(3 + 3 * AXES) + 6;  // bits of a place in the memory
 
@@ -57,21 +65,22 @@ module register_memory #(
     assign ready = count[11];
 
     register_layout #(
-        .AXES          (AXES),
-        .FILTERS       (FILTERS),
-        .HAS_BRIDGE    (HAS_BRIDGE),
-        .HAS_COMPARE   (HAS_COMPARE),
-        .HAS_DAC       (HAS_DAC),
-        .HAS_DRIVE     (HAS_DRIVE),
-        .HAS_FINE_STAGE(HAS_FINE_STAGE),
-        .HAS_HARMONICS (HAS_HARMONICS),
-        .HAS_MONITOR   (HAS_MONITOR),
-        .HAS_RECORDER  (HAS_RECORDER),
-        .HAS_SINE      (HAS_SINE),
-        .HAS_STEPPER   (HAS_STEPPER),
-        .HAS_VELOCITY  (HAS_VELOCITY)
+        .AXES             (AXES),
+        .FILTERS          (FILTERS),
+        .HAS_BRIDGE       (HAS_BRIDGE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_DAC          (HAS_DAC),
+        .HAS_DRIVE        (HAS_DRIVE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_STEPPER      (HAS_STEPPER),
+        .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_layout (
-        .address(ready ? address : {3'd0, count[10:0]}),
+        .address(stored_at),
         .wdata,
         .place,
         .kept,
@@ -79,6 +88,10 @@ module register_memory #(
         .low,
         .high
     );
+
+    assign stores       = ready ? put && !low : !hold;
+    assign stored_at    = ready ? address : {3'd0, count[10:0]};
+    assign stored_value = ready ? kept : first;
 
     wire         store = !ready || commit || (put && !low);
     wire [W-1:0] store_place = commit ? low_place : place;
@@ -90,7 +103,7 @@ module register_memory #(
     end
 
     always_ff @(posedge clk) begin
-        if (!ready) count <= count + 12'd1;
+        if (!ready && !hold) count <= count + 12'd1;
         if (put && low) wdata_low <= wdata;
         commit    <= put && high;
         low_place <= {place[W-1:1], 1'b0};
@@ -111,19 +124,20 @@ module register_memory #(
     wire [31:0] observed_kept, observed_first;
     wire observed_low, observed_high;
     register_layout #(
-        .AXES          (AXES),
-        .FILTERS       (FILTERS),
-        .HAS_BRIDGE    (HAS_BRIDGE),
-        .HAS_COMPARE   (HAS_COMPARE),
-        .HAS_DAC       (HAS_DAC),
-        .HAS_DRIVE     (HAS_DRIVE),
-        .HAS_FINE_STAGE(HAS_FINE_STAGE),
-        .HAS_HARMONICS (HAS_HARMONICS),
-        .HAS_MONITOR   (HAS_MONITOR),
-        .HAS_RECORDER  (HAS_RECORDER),
-        .HAS_SINE      (HAS_SINE),
-        .HAS_STEPPER   (HAS_STEPPER),
-        .HAS_VELOCITY  (HAS_VELOCITY)
+        .AXES             (AXES),
+        .FILTERS          (FILTERS),
+        .HAS_BRIDGE       (HAS_BRIDGE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_DAC          (HAS_DAC),
+        .HAS_DRIVE        (HAS_DRIVE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_STEPPER      (HAS_STEPPER),
+        .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_observed (
         .address(observed),
         .wdata,

@@ -2,20 +2,19 @@
 // axis_inputs -- brings the input pins of an axis into the clock domain, and filters its limit
 // switches.
 //
-// latency  2 cycles from a pin to its level; LIMIT_CYCLES + 2 cycles from a limit switch to
-//          limit_low and limit_high
-// rate     one change of each pin per cycle; a limit switch changes at most every LIMIT_CYCLES
-// behaviour  A limit switch must keep its level for 0.1 ms. limit_low_open and limit_high_open are
-//          high when the switch is pressed or its wire is cut.
+// latency  2 cycles from a pin to its level; as in switch_filter, with 8 periods of limit_tick, from
+//          there to limit_low and limit_high
+// rate     one change of each pin per cycle; a limit switch changes at most every 8 periods of
+//          limit_tick
+// behaviour  limit_low_open and limit_high_open are high when the switch is pressed or its wire is
+//          cut.
 // model    tb/sense/axis_inputs.py, equal in every bit of every cycle
 `default_nettype none
 
-module axis_inputs #(
-    parameter int CLK_HZ       = 4_000_000,       // Hz, clk frequency
-    parameter int LIMIT_CYCLES = CLK_HZ / 10_000  // cycles that a limit switch must be stable
-) (
+module axis_inputs (
     input  wire        clk,
     input  wire        rst,
+    input  wire        limit_tick,       // strobe: an eighth of the time of a limit switch
     input  wire        encoder_a,        // pin of the scale
     input  wire        encoder_b,        // pin of the scale
     input  wire        encoder_z,        // pin of the scale: index
@@ -31,11 +30,7 @@ module axis_inputs #(
     output logic       limit_high,       // level: pressed, filtered
     output logic       drive_fault       // level: the drive reports a fault
 );
-    if (LIMIT_CYCLES < 1 || LIMIT_CYCLES > 65535) begin : g_check
-        LIMIT_CYCLES_MUST_BE_FROM_1_TO_65535 u_error ();
-    end
-
-    wire low_level, high_level, fault_level_n, low_rejected, high_rejected;
+    wire low_level, high_level, fault_level_n;
 
     synchroniser #(
         .W(8)
@@ -47,26 +42,17 @@ module axis_inputs #(
         }),
         .q({probe_level, fault_level_n, high_level, low_level, z, b, a})
     );
-    deglitcher u_low (
+    switch_filter #(
+        .W(2)
+    ) u_limits (
         .clk,
         .rst,
-        .stable_cycles(16'(LIMIT_CYCLES)),
-        .level        (low_level),
-        .filtered     (limit_low),
-        .rejected     (low_rejected)
-    );
-    deglitcher u_high (
-        .clk,
-        .rst,
-        .stable_cycles(16'(LIMIT_CYCLES)),
-        .level        (high_level),
-        .filtered     (limit_high),
-        .rejected     (high_rejected)
+        .sample  (limit_tick),
+        .level   ({high_level, low_level}),
+        .filtered({limit_high, limit_low})
     );
 
     assign drive_fault = !fault_level_n;
-
-    wire unused = &{1'b0, low_rejected, high_rejected};
 endmodule
 
 `default_nettype wire

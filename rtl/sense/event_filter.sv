@@ -9,8 +9,8 @@
 // behaviour A disturbance is followed from its first sample, and forgotten at the sample of the old
 //          level that exceeds M - N. This is stricter than a sliding window of M samples and needs
 //          no memory. With tolerated = 0 and skip = 0 the filter equals the deglitcher. A new
-//          value of skip acts from the next sample on, a new value of required one cycle later;
-//          required and tolerated act on new disturbances only.
+//          value of skip acts at once, a new value of required one cycle later; required and
+//          tolerated act on new disturbances only.
 // source   S2: N-of-M event filter, N equal samples at a chosen sampling rate
 // model    tb/sense/event_filter.py, equal in every bit of every cycle
 // proved   a change passes only at a sample, and only if N of the last M samples had the new
@@ -45,20 +45,22 @@ module event_filter #(
 
     logic [     S-1:0] settle;  // cycles left of the start-up
     logic              settling;
-    logic [SKIP_W-1:0] left;  // cycles until the next sample
+    logic [SKIP_W-1:0] skipped;  // cycles since the last sample, less one
 
     // required - 1; registered to keep required out of long paths
     logic [     W-1:0] last;
 
-    wire               sample = left == '0;
+    // A number counted up from 0 contains all bits of another one for the first time when they are
+    // equal. The comparison needs no adder, and the counters never overflow.
+    wire               sample = &(skipped | ~skip);
 
     always_ff @(posedge clk) begin
         last <= required - W'(required != '0);
-        left <= sample ? skip : left - 1'b1;
+        skipped <= sample ? '0 : skipped + 1'b1;
         if (settling) settle <= settle - 1'b1;
         settling <= settle != '0 && settle != S'(1);
         if (rst) begin
-            left     <= '0;
+            skipped  <= '0;
             settle   <= S'(SETTLE);
             settling <= 1'b1;
         end
@@ -69,22 +71,19 @@ module event_filter #(
         // samples of the old level since the first of the new
         logic [TOLERATED_W-1:0] against;
 
-        // A number counted up from 0 contains all bits of another one for the first time when
-        // they are equal. The comparison needs no adder, and the counter never overflows.
         wire                    differs = level[i] ^ filtered[i];
         wire                    ripe = &(seen | ~last);
         wire                    over = &(against | ~tolerated);
+        wire                    ends = sample && (differs ? ripe : over);
 
         always_ff @(posedge clk) begin
-            rejected[i] <= !settling && sample && !differs && over && seen != '0;
-            if (settling || (sample && differs && ripe)) filtered[i] <= level[i];
-            if (sample) begin
-                if (differs) seen <= seen + 1'b1;
-                else if (seen != '0) against <= against + 1'b1;
-                if (settling || (differs ? ripe : over)) begin
-                    seen    <= '0;
-                    against <= '0;
-                end
+            rejected[i] <= !settling && ends && !differs && seen != '0;
+            if (settling || (ends && differs)) filtered[i] <= level[i];
+            if (sample && differs) seen <= seen + 1'b1;
+            if (sample && !differs && seen != '0) against <= against + 1'b1;
+            if (settling || ends) begin
+                seen    <= '0;
+                against <= '0;
             end
             if (rst) begin
                 seen        <= '0;

@@ -2,7 +2,8 @@
 """Figures of area: what an axis and what a node cost on the chip, and how fast the node runs.
 
 A cell of LUT RAM (TRELLIS_DPR16X4) counts as the six LUT4 that it takes on an ECP5, a carry cell
-(CCU2C) as two.
+(CCU2C) as two. The figures of an axis map to LUT4 alone (synth_ecp5 -nowidelut), which makes a
+netlist of fewer LUT4 and a slower one; those of whole nodes, which are placed, use the wide LUT.
 """
 
 from collections.abc import Mapping
@@ -30,6 +31,7 @@ TARGET_MHZ = 66
 ALL_AXES = 255
 BEFORE = 2  # axes of the node that gets another one
 LUT_OF = 24288  # of an LFE5U-25F
+SMALL = "-nowidelut"  # every LUT counts alone; with the wide ones Yosys takes more LUT4 (2 to 5 %)
 
 # A/B/Z, step and direction, homing, profile, servo, interlock
 STEP_AXES: Parameters = {
@@ -38,6 +40,7 @@ STEP_AXES: Parameters = {
     "HAS_SINE": 0,
     "HAS_CAPTURE": 0,
     "HAS_COMPARE": 0,
+    "HAS_ENCODER_CHECK": 0,
     "HAS_BRIDGE": 0,
     "HAS_STEPPER": ALL_AXES,
     "HAS_DAC": 0,
@@ -65,6 +68,7 @@ SPRAM = "-spram -dsp"
 OF_BOTH: dict[str, Parameters] = {
     "compare": {"HAS_COMPARE": ALL_AXES},
     "capture queue": {"HAS_CAPTURE": ALL_AXES},
+    "check of the encoder": {"HAS_ENCODER_CHECK": ALL_AXES},
     "segment table of 255": {"SEGMENTS": 255},
     "two biquads": {"FILTERS": 2},
 }
@@ -81,7 +85,7 @@ OF_SINE_AXES: dict[str, Parameters] = {
 @cache
 def node_lut(parameters: tuple[tuple[str, int | str], ...]) -> int:
     """LUT4 of a node on an ECP5."""
-    return lut4s(netlist_of(source_of("node"), dict(parameters), "ecp5", 1), "node")
+    return lut4s(netlist_of(source_of("node"), dict(parameters), "ecp5", 1, SMALL), "node")
 
 
 def lut_of(parameters: Parameters, axes: int) -> int:
@@ -188,8 +192,8 @@ FIGURES = {
     "axis_step_lut": Figure(
         axis_step_lut,
         "LUT4",
-        f"what each further axis adds to a node: {STEP_WORDS}; two for a carry cell, six for a "
-        "cell of LUT RAM",
+        f"what each further axis adds to a node: {STEP_WORDS}; mapped to LUT4 alone, two for a "
+        "carry cell, six for a cell of LUT RAM",
         "<= 1200",
         ELABORATED,
         0,

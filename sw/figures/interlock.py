@@ -23,10 +23,11 @@ from moire.errors import BusError, Refused
 from twin import Axis, Node, Twin, TwinTransport, build
 
 DRIVER = Path(__file__).with_name("interlock_run.cpp")
+BENCH = Path(__file__).with_name("one_axis_bench.sv")
 FAULTS = 10**4
 NODE_FAULTS, CORE_FAULTS = 200, 100  # of them: in the whole node; in its soft core
 SHARE = 400  # faults of the axis in one run, with a seed of its own
-CLK_HZ = 1_500_000
+CLK_HZ = 1_800_000
 TICK_S = 1 / 4000
 WATCHDOG_S = 0.04
 ANSWER_S = 0.01  # that the longest answer takes on the bus, after its request
@@ -55,7 +56,7 @@ def axis_faults(
     count: int, seed: int = 1, done: Callable[[int], None] = lambda n: None
 ) -> dict[str, int]:
     """{name: number} over so many faults of the axis: faults, failures, and those of each cause."""
-    program = build.simulation(DRIVER, ROOT / "rtl" / "axis.sv", CLK_HZ=4_000_000)
+    program = build.simulation(DRIVER, BENCH)
     totals: dict[str, int] = {}
 
     def run(share: tuple[int, int]) -> Iterator[tuple[str, int]]:

@@ -27,9 +27,12 @@ namespace {
 using moire::Random;
 
 constexpr int64_t COUNT = 1 << 14;                // position, in 2^-16 period
-constexpr int LIMIT_CYCLES = 4'000'000 / 10'000;  // limit switches must be stable for 0.1 ms
+constexpr int LIMIT_CYCLES = 4'000'000 / 10'000;  // limit switches must be stable for 0.1 ms,
+constexpr int LIMIT_TICK = LIMIT_CYCLES / 8;      // less one period of limit_tick at most
 constexpr int SENSED = 24;  // cycles from a and b to position, at most; 3 at least
 constexpr int HISTORY = 1 << 15;
+constexpr int SERVED = 570;  // cycles from a tick until the engine has served it
+constexpr unsigned AXIS = 0x400, FEEDBACK = 0xC00, ACTUATOR = 0x1400;  // the blocks
 constexpr int64_t NEVER = INT64_MAX / 2;
 
 enum Cause {  // the bits of axis.faults
@@ -43,14 +46,17 @@ enum Cause {  // the bits of axis.faults
     CPU = AXIS_FAULTS_CPU_SHIFT,
     UNDERRUN = AXIS_FAULTS_PROFILE_UNDERRUN_SHIFT,
     OVERRUN = AXIS_FAULTS_STEP_OVERRUN_SHIFT,
+    SERVO = AXIS_FAULTS_SERVO_OVERRUN_SHIFT,
     CAUSES
 };
 static_assert(LIMIT_LOW == 0 && LIMIT_HIGH == 1 && ESTOP == 2 && FOLLOWING == 3 && ENCODER == 4 &&
-                  WATCHDOG == 5 && DRIVE == 6 && CPU == 7 && UNDERRUN == 8 && OVERRUN == 9,
+                  WATCHDOG == 5 && DRIVE == 6 && CPU == 7 && UNDERRUN == 8 && OVERRUN == 9 &&
+                  SERVO == 10,
               "NAMES has the order of axis.faults");
-const char* const NAMES[CAUSES] = {"limit_low",        "limit_high",   "estop", "following_error",
-                                   "encoder",          "bus_watchdog", "drive", "cpu",
-                                   "profile_underrun", "step_overrun"};
+const char* const NAMES[CAUSES] = {"limit_low",       "limit_high",   "estop",
+                                   "following_error", "encoder",      "bus_watchdog",
+                                   "drive",           "cpu",          "profile_underrun",
+                                   "step_overrun",    "servo_overrun"};
 constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU};
 constexpr unsigned LATCH_ALWAYS = 1 << ESTOP | 1 << DRIVE | 1 << CPU;
 
@@ -69,14 +75,16 @@ struct Bench {
     bool follows = true, jammed = false;  // moves to the target; cannot move
     std::vector<int64_t> counts = std::vector<int64_t>(HISTORY);
     // what was seen
-    int64_t target = 0, target_before = 0;  // of this tick and the last, 2^-16 period
+    int64_t target = 0, target_before = 0;  // of the last two ticks that were served, 2^-16 period
+    int64_t early_at = NEVER;               // a tick too soon
     int64_t steps = 0, off_at = NEVER, on_clk = 0;
     bool was_on = false, step_was = false;
 
     void clk() {
-        pins->tick = now - tick_at >= period;
+        pins->tick = now - tick_at >= period || now == early_at;
         if (pins->tick) tick_at = now, ticks++;
         pins->sample_tick = now % sample_period == 0;
+        pins->limit_tick = now % LIMIT_TICK == 0;
         if (!jammed && count != wanted && now - moved_at >= count_cycles)
             count += wanted > count ? 1 : -1, moved_at = now;
         const int gray = int(count + skew) & 3;
@@ -92,29 +100,29 @@ struct Bench {
     }
     int64_t count_at(int64_t when) const { return counts[size_t(when % HISTORY)]; }
 
-    void access(bool write, unsigned word, uint32_t data) {
-        pins->write = write, pins->word = word / 4, pins->wdata = data;
+    void access(bool write, unsigned address, uint32_t data) {
+        while (!pins->ready) clk();
+        pins->select = 1, pins->write = write, pins->address = uint16_t(address),
+        pins->wdata = data;
         clk();
-        pins->select = pins->feedback_select = pins->actuator_select = 0;
+        pins->select = 0;
     }
-    void put(unsigned word, uint32_t data) { pins->select = 1, access(true, word, data); }
-    void put_actuator(unsigned word, uint32_t data) {
-        pins->actuator_select = 1, access(true, word, data);
-    }
+    void put(unsigned word, uint32_t data) { access(true, AXIS + word, data), clk(); }
+    void put_actuator(unsigned word, uint32_t data) { access(true, ACTUATOR + word, data), clk(); }
     void put_wide(unsigned word, int64_t data) {
         put(word, uint32_t(data)), put(word + 4, uint32_t(data >> 32));
     }
-    uint32_t get(unsigned word) { return pins->select = 1, access(false, word, 0), pins->rdata; }
+    uint32_t get(unsigned word) { return access(false, AXIS + word, 0), pins->rdata; }
     int64_t get_position(unsigned word) {
         const uint64_t low = get(word), high = get(word + 4);
         return int64_t((high << 32 | low) << 16) >> 16;
     }
-    // One cycle; and once per tick the target is read, and the machine sent there.
+    int64_t target_now() const { return int64_t(uint64_t(pins->target) << 16) >> 16; }
+    // One cycle; and when a tick was served the machine is sent to its target.
     void step() {
         clk();
-        if (now - tick_at == 20) {
-            const int64_t position = get_position(AXIS_TARGET_LOW);
-            target_before = target, target = position;
+        if (now - tick_at == SERVED) {
+            target_before = target, target = target_now();
             if (follows) wanted = (target + COUNT / 2) >> 14;
         }
     }
@@ -139,7 +147,7 @@ struct Bench {
     Window window(Cause cause) const {
         switch (cause) {
         case LIMIT_LOW:
-        case LIMIT_HIGH: return {now + LIMIT_CYCLES, now + LIMIT_CYCLES + 6};
+        case LIMIT_HIGH: return {now + LIMIT_CYCLES - LIMIT_TICK, now + LIMIT_CYCLES + 6};
         case DRIVE: return {now + 2, now + 6};
         default: return {now + 1, now + 1};
         }
@@ -175,11 +183,9 @@ struct Campaign {
         for (int n = 0; n < 20; n++) b.clk();
         b.put(AXIS_SENSING, FIELD_PUT(AXIS_SENSING_DEGLITCH, 2));
         b.put(AXIS_ENCODER_FAULT_MASK, 31), b.put(AXIS_DISAGREEMENT_LIMIT, 0);
-        b.pins->feedback_select = 1,
-        b.access(true, FEEDBACK_POSITION_SOURCE, FEEDBACK_POSITION_SOURCE_COUNTS_MASK);
+        b.access(true, FEEDBACK + FEEDBACK_POSITION_SOURCE, FEEDBACK_POSITION_SOURCE_COUNTS_MASK);
         b.put(AXIS_KP, 1600), b.put(AXIS_KI, uint32_t(random.below(30000)));
-        b.put(AXIS_SERVO_LIMITS, FIELD_PUT(AXIS_SERVO_LIMITS_OUTPUT, 30000) |
-                                     FIELD_PUT(AXIS_SERVO_LIMITS_INTEGRAL, 20000));
+        b.put(AXIS_OUTPUT_LIMIT, 30000), b.put(AXIS_INTEGRAL_LIMIT, 20000);
         b.put_actuator(ACTUATOR_PWM_PERIOD, 200), b.put_actuator(ACTUATOR_DAC, 2 | 500 << 8);
         b.put_actuator(ACTUATOR_STEP_PULSE, FIELD_PUT(ACTUATOR_STEP_PULSE_HIGH, 20) |
                                                 FIELD_PUT(ACTUATOR_STEP_PULSE_LOW, 20));
@@ -377,13 +383,14 @@ struct Campaign {
         Window window;
         while (b.now < end && b.off_at == NEVER) {
             b.step();
-            if (std::abs(b.target - b.count * COUNT) > limit)
+            const int64_t target = b.target_now();
+            if (std::abs(target - b.count * COUNT) > limit)
                 window.first = std::min(window.first, b.now - SENSED);
-            // the target of this tick is known here; the position that the tick measured is one of
-            // these two or between them
-            const bool sure = std::abs(b.target - b.count_at(b.tick_at - SENSED) * COUNT) > limit &&
-                              std::abs(b.target - b.count_at(b.tick_at + 8) * COUNT) > limit;
-            if (b.now - b.tick_at == 24 && sure && window.last == NEVER)
+            // the target of this tick is known when it is served; the position that the tick
+            // measured is one of these two or between them
+            const bool sure = std::abs(target - b.count_at(b.tick_at - SENSED) * COUNT) > limit &&
+                              std::abs(target - b.count_at(b.tick_at + 8) * COUNT) > limit;
+            if (b.now - b.tick_at == SERVED && sure && window.last == NEVER)
                 window.last = b.tick_at + b.period;
         }
         judge({{FOLLOWING, window}}, since);
@@ -432,14 +439,13 @@ struct Campaign {
         nonsense(UNDERRUN);
     }
 
-    // More steps than the wire can carry: the generator may be 2^22 / tick_period behind.
+    // More steps than the wire can carry: the generator may be 2^(AHEAD_W - 2) steps behind.
     void overrun() {
         Bench& b = *bench;
         kind_of_drive(1);
         switch_on(0, 0);
         b.run_ticks(2);
-        const int64_t most_behind = (int64_t(1) << 22) / b.period, origin = b.steps,
-                      position = b.target;
+        const int64_t most_behind = 256, origin = b.steps, position = b.target;
         const auto behind = [&](int64_t target) {
             return std::abs((((target - position) * ratio) >> 16) - (b.steps - origin));
         };
@@ -453,7 +459,7 @@ struct Campaign {
             if (window.first == NEVER &&
                 std::max(behind(b.target), behind(b.target_before)) > most_behind - 3)
                 window.first = b.now - b.period;
-            // the line to the target of a tick ends in the next one, within 60 cycles
+            // the line to the target of a tick begins at the next one and ends at the one after
             if (window.last == NEVER && b.now - b.tick_at == 62 &&
                 behind(b.target_before) > most_behind + 3)
                 window.last = b.tick_at + b.period;
@@ -465,6 +471,23 @@ struct Campaign {
         kind_of_drive(0);
     }
 
+    // A tick while the engine serves the one before.
+    void servo() {
+        Bench& b = *bench;
+        switch_on(random.one_in(2) ? random.from(-9, 9) : 0, 40);
+        b.run(random.below(3 * b.period));
+        const int64_t since = b.now;
+        if (!b.pins->drive_enable) return fail("drive off without a cause");
+        b.off_at = NEVER;
+        b.run_ticks(1);
+        b.early_at = b.now + random.from(1, 100);
+        const Window window{b.early_at + 2, b.early_at + 3};
+        b.run(3 * b.period);
+        judge({{SERVO, window}}, since);
+        pins_rest();
+        nonsense(SERVO);
+    }
+
     // These are no faults: a glitch of a switch, and a switch while homing.
     void no_fault() {
         Bench& b = *bench;
@@ -474,7 +497,7 @@ struct Campaign {
         b.run_ticks(3);
         const int64_t on = b.on_clk, begin = b.now;
         b.pin(cause, true);
-        b.run(homing ? 2 * b.period : random.from(1, LIMIT_CYCLES - 1));
+        b.run(homing ? 2 * b.period : random.from(1, LIMIT_CYCLES - LIMIT_TICK - 1));
         b.pin(cause, false);
         b.run(LIMIT_CYCLES + 40);
         if (b.on_clk - on != b.now - begin || b.get(AXIS_FAULTS)) fail("fault without a cause");
@@ -496,8 +519,10 @@ struct Campaign {
             encoder();
         else if (cause == UNDERRUN)
             underrun();
-        else
+        else if (cause == OVERRUN)
             overrun();
+        else
+            servo();
         faults++, injected[cause]++;
         if (!person_resets()) fail("a person cannot reset it");
         if (random.one_in(10)) harmless++, no_fault(), calm();

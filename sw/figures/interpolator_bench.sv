@@ -22,7 +22,6 @@ module interpolator_bench #(
     input  wire         [  7:0] point,             // 2^-8 period
     input  wire signed  [ 17:0] value,             // 2^-20 period
     input  wire                 swap,              // strobe: use the written table
-    input  wire                 shift,             // strobe: move the origin
     input  wire signed  [ 31:0] shift_periods,     // periods
     input  wire                 valid,             // strobe: sin and cos are a new ADC word
     input  wire signed  [W-1:0] sin,               // counts, full scale = 2^(W-1)
@@ -31,11 +30,11 @@ module interpolator_bench #(
     output logic signed [ 47:0] position,          // Q32.16 periods
     output logic                overspeed          // strobe: the speed is too high
 );
-    localparam int INPUTS = 8 + 8 + 1 + 16 + 16 + 17 + 17 + 1 + 1 + 8 + 18 + 1 + 1 + 32 + 1 + 2 * W;
+    localparam int INPUTS = 8 + 8 + 1 + 16 + 16 + 17 + 17 + 1 + 1 + 8 + 18 + 1 + 32 + 1 + 2 * W;
 
     logic [INPUTS-1:0] held;
     wire [7:0] outlier_step_q, outlier_hold_q, point_q;
-    wire load_q, enable_q, write_q, swap_q, shift_q, converted;
+    wire load_q, enable_q, write_q, swap_q, converted;
     wire sampled, corrected, phase_valid, harmonics_off, stepped;
     wire signed [15:0] sin_offset_q, cos_offset_q, corrected_sin, corrected_cos;
     wire [16:0] gain_q;
@@ -48,7 +47,7 @@ module interpolator_bench #(
 
     assign {
         outlier_step_q, outlier_hold_q, load_q, sin_offset_q, cos_offset_q, gain_q,
-        quadrature_error_q, enable_q, write_q, point_q, value_q, swap_q, shift_q,
+        quadrature_error_q, enable_q, write_q, point_q, value_q, swap_q,
         shift_periods_q, converted, raw_sin, raw_cos
     } = held;
     always_ff @(posedge clk) begin
@@ -65,7 +64,6 @@ module interpolator_bench #(
             point,
             value,
             swap,
-            shift,
             shift_periods,
             valid,
             sin,
@@ -154,7 +152,6 @@ module interpolator_bench #(
         .valid        (stepped),
         .step,
         .phase        (tracked_phase),
-        .shift        (shift_q),
         .shift_periods(shift_periods_q),
         .done,
         .position

@@ -95,7 +95,6 @@ module legacy_bench #(
         .valid        (stepped),
         .step,
         .phase        (tracked),
-        .shift        (1'b0),
         .shift_periods(32'sd0),
         .done         (placed),
         .position     (place)
@@ -181,7 +180,6 @@ module legacy_bench #(
         .valid        (moved),
         .step         (move),
         .phase        (followed),
-        .shift        (1'b0),
         .shift_periods(32'sd0),
         .done,
         .position

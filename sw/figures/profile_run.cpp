@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// profile_run -- play random moves, planned by the firmware's planner, on the Verilated player, and
+// profile_run -- play random moves, planned by the firmware's planner, on the Verilated engine, and
 // compare every step with the limits.
 //
 //   profile_run MOVES SEED
@@ -53,8 +53,24 @@ struct Bench {
         pins.tick = 1, clk();
         pins.tick = 0;
         do clk();
-        while (!pins.prepared);
+        while (pins.busy);
+        clk();  // the last result is shown
     }
+    void reset() {
+        pins.rst = 1, clk(), clk(), pins.rst = 0;
+        while (!pins.ready) clk();
+    }
+    // The numbers of the words are those of tables/engine_microcode.py.
+    void setting(unsigned word, uint64_t value) {
+        pins.setting_write = 1, pins.setting_word = word, pins.setting = value, clk();
+        pins.setting_write = 0;
+        while (pins.setting_waits) clk();
+    }
+    void request(uint8_t& strobe) {
+        strobe = 1, clk(), strobe = 0;
+        while (pins.pending) clk();
+    }
+    void fraction(uint32_t value) { setting(OVERRIDE, uint64_t(value) << 16); }
 };
 
 }  // namespace
@@ -68,7 +84,7 @@ int main(int count, char** words) {
     Random random{seed * 0x9E3779B97F4A7C15ULL + 1};
     auto bench = std::make_unique<Bench>();
     auto& pins = bench->pins;
-    pins.rst = 1, bench->clk(), bench->clk(), pins.rst = 0;
+    bench->reset();
 
     uint64_t moves = 0, misses = 0, ticks = 0, retargets = 0, refused = 0, overridden = 0,
              stops = 0, landed_wrong = 0, above = 0;
@@ -102,13 +118,13 @@ int main(int count, char** words) {
         if (plan.ticks > 4000) continue;
         moves++;
 
-        pins.slope = ramp, pins.curve = curve;
-        pins.feed_fraction = 65536, pins.pause = 0;
-        pins.stop_deceleration = kind == 0
-                                     ? 0
-                                     : uint32_t(std::fmin(double(limits.acceleration >> 8),
-                                                          4294967295.0));  // stepped stop in a step
-        pins.stop_jerk = kind == 1 ? 0 : limits.jerk;
+        bench->setting(OVERRIDE_SLOPE, ramp), bench->setting(OVERRIDE_CURVE, curve);
+        bench->fraction(65536);
+        const auto deceleration =
+            uint32_t(std::fmin(double(limits.acceleration >> 8), 4294967295.0));
+        bench->setting(STOP_DECELERATION,  // a stepped profile stops in a step
+                       kind == 0 ? 0 : uint64_t(deceleration) << 8);
+        bench->setting(STOP_JERK, kind == 1 ? 0 : limits.jerk);
         const __int128 begin = bench->exact();
         const uint64_t underruns = bench->underruns;
         __int128 before = begin, step = 0, slope = 0,
@@ -138,24 +154,23 @@ int main(int count, char** words) {
                 planner_segment piece;
                 bool last;
                 if (!planner_take_up_to(&plan, &piece, &last, 32)) break;
-                pins.segment_velocity = uint64_t(piece.velocity),
-                pins.segment_acceleration = uint64_t(piece.acceleration);
-                pins.segment_jerk = uint32_t(piece.jerk), pins.segment_ticks = piece.ticks,
-                pins.segment_last = last;
-                pins.push = 1, bench->clk(), pins.push = 0;
-                for (int n = 1; n < 7; n++) bench->clk();
+                bench->setting(SEGMENT_VELOCITY, uint64_t(piece.velocity)),
+                    bench->setting(SEGMENT_ACCELERATION, uint64_t(piece.acceleration)),
+                    bench->setting(SEGMENT_JERK, uint64_t(int64_t(piece.jerk))),
+                    bench->setting(SEGMENT_TICKS, piece.ticks | uint32_t(last) << 24);
+                bench->request(pins.push);
                 queued += piece.ticks, end_queued = last;
             }
-            if (!started) started = true, pins.start = 1, bench->clk(), pins.start = 0;
+            if (!started) started = true, bench->request(pins.start);
             if (!pins.moving) break;
             if (override_left && random.one_in(100))
-                pins.feed_fraction = random() % 65537, pins.pause = random.one_in(4),
-                override_left--, overridden++, changed = true;
+                bench->fraction(random.one_in(4) ? 0 : random() % 65537), override_left--,
+                    overridden++, changed = true;
             else if (slowed && random.one_in(200))
-                pins.feed_fraction = 65536, pins.pause = 0;
+                bench->fraction(65536);
             if (stop_at && played == stop_at && !stopped) {
                 stopped = true, stops++, late = slope < 0 ? -slope : slope;
-                pins.controlled_stop = 1, bench->clk(), pins.controlled_stop = 0;
+                bench->request(pins.controlled_stop);
             }
             bench->tick(), played++, ticks++;
             __int128 now = bench->exact(), step_now = now - before, slope_now = step_now - step,
@@ -196,7 +211,7 @@ int main(int count, char** words) {
                              (unsigned long long)seed, (unsigned long long)moves, kind, slowed,
                              stopped, pins.moving,
                              (unsigned long long)(bench->underruns - underruns));
-            pins.rst = 1, bench->clk(), pins.rst = 0;
+            bench->reset();
         }
         misses += missed || bad;
     }

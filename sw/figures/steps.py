@@ -13,6 +13,7 @@ from figures.synthesis import ELABORATED, elaborated, synthesise_ice40
 from twin.build import run, simulation
 
 DRIVER = Path(__file__).with_name("steps_run.cpp")
+BENCH = Path(__file__).with_name("steps_bench.sv")
 SOURCE = ROOT / "rtl" / "drive" / "step_generator.sv"
 REVERSALS = 10**6
 SHARE = 10**5  # reversals of one run, each with a seed of its own
@@ -21,7 +22,7 @@ RATES = 24  # random speeds; every eighth is the highest one, a step every 2 cyc
 
 def steps_run(*arguments: object) -> dict[str, float]:
     """{name: value} that the program prints."""
-    words = run([simulation(DRIVER, SOURCE), *arguments], "steps_run").split()
+    words = run([simulation(DRIVER, BENCH), *arguments], "steps_run").split()
     return {name: float(value) for value, name in zip(words[::2], words[1::2])}
 
 
@@ -126,8 +127,9 @@ FIGURES = {
     "step_hx8k_lc": Figure(
         step_hx8k_lc,
         "LC",
-        "step generator (for comparison: without its registers and scaler) with all timings and "
-        "modes on an iCE40 HX8K, placement seed 1",
+        "step generator (for comparison: without its registers, and without step_lines, which "
+        "gives the rates of all axes as the PC gives them to HostMot2) with all timings and modes "
+        "on an iCE40 HX8K, placement seed 1",
         "< 406",
         ELABORATED,
         0,

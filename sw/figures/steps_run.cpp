@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// steps_run -- drive the Verilated step_generator and judge its pins from outside, by a driver that
+// steps_run -- drive the Verilated steps_bench and judge its pins from outside, by a driver that
 // knows only its data sheet and the targets.
 //
 //   steps_run reversals COUNT SEED    random lines with reversals, random timings and polarity,
@@ -62,6 +62,15 @@ struct Bench {
         for (int n = 0; n < 4; n++) clk();
         pins->rst = 0;
     }
+    // A tick with this target, and what follows until the next one; the line to it begins then.
+    template <class Each>
+    void line(int64_t position, unsigned period, Each each) {
+        target(position), pins->tick = 1;
+        for (unsigned k = 0; k < period; k++) clk(), pins->tick = 0, each();
+    }
+    void line(int64_t position, unsigned period) {
+        line(position, period, [] {});
+    }
     void target(int64_t position) { pins->target = uint64_t(position) & 0xFFFFFFFFFFFFULL; }
     void settings(Random& random, unsigned longest, unsigned period) {
         pins->enable = 0;
@@ -100,6 +109,7 @@ int reversals(uint64_t required, uint64_t seed) {
             std::max<int64_t>(pins.high_cycles, 1) + std::max<int64_t>(pins.low_cycles, 1);
         const int64_t fastest = std::min<int64_t>(ONE * period / per_step, 200 * ONE);  // per line
         pins.enable = 1;
+        bench.line(position, period);  // the lines begin here
         const int64_t origin = whole(position) - int32_t(pins.steps);
         for (int stretch = 0; stretch < 400; stretch++) {
             const int64_t speed =
@@ -108,20 +118,16 @@ int reversals(uint64_t required, uint64_t seed) {
             const int length = 1 + random.below(2);
             for (int n = 0; n < length; n++) {
                 position += speed, lines++;
-                bench.target(position), pins.tick = 1;
-                for (unsigned k = 0; k < period; k++) {
-                    bench.clk(), clks++;
-                    pins.tick = 0;
-                    lost += int32_t(pins.steps) != int32_t(bench.driver.count);
-                }
+                bench.line(position, period, [&] {
+                    clks++, lost += int32_t(pins.steps) != int32_t(bench.driver.count);
+                });
             }
             overruns += pins.overrun;
         }
-        for (int n = 0; n < 4000; n++) bench.clk();
+        bench.line(position, 4000);
         lost += int32_t(pins.steps) != whole(position) - origin;  // the target must be reached
-        pins.tick = 1, position += random.below(100 * ONE),
-        bench.target(position);  // off in motion
-        for (int n = 0, off = random.below(period); n < off; n++) bench.clk(), pins.tick = 0;
+        position += random.below(std::min<int64_t>(100 * ONE, fastest));
+        bench.line(position, period), bench.line(position, random.below(period));  // off in motion
         pins.enable = 0, pins.tick = 0, offs++;
         for (int n = 0; n < 200; n++)
             bench.clk(), lost += int32_t(pins.steps) != int32_t(bench.driver.count);
@@ -147,26 +153,25 @@ int rate(uint64_t seed) {
         seed % 8 == 1 ? top : 1 + span - random.below(span / 2 + 1);  // 2^-16 step per line
     const int64_t slope = std::min(speed, top);
     bench.target(start), bench.settings(random, 0, unsigned(period)), pins.enable = 1;
-    start += 2 * ONE, bench.target(start),
-        pins.tick = 1;  // set to up; at the highest rate it cannot catch up after a reversal
-    for (int64_t k = 0; k < period + 20; k++) bench.clk(), pins.tick = 0;
+    bench.line(start, unsigned(period)), start += 2 * ONE;
+    // set to up; at the highest rate it cannot catch up after a reversal
+    bench.line(start, unsigned(period)), bench.line(start, unsigned(period) + 20);
     const int64_t origin = whole(start) - bench.driver.count;
     int64_t position = start, clks = 0, edges = 0, first = 0, last = 0;
     double jitter = 0;
-    while (clks < 4'000'000) {
-        position += slope, bench.target(position), pins.tick = 1;
-        for (int64_t k = 0; k < period; k++) {
-            bench.clk(), clks++;
-            pins.tick = 0;
-            if (!bench.driver.edge || clks < 2 * period) continue;
+    while (clks < 4'000'000 + period) {
+        position += slope;
+        bench.line(position, unsigned(period), [&] {
+            clks++;
+            if (!bench.driver.edge || clks < 3 * period) return;
             if (!edges) first = clks;
             last = clks, edges++;
-            // the step to `passed` is on the line in this cycle, counted from the first tick; tick,
-            // line and pin take 2 cycles
+            // the step to `passed` is on the line in this cycle, counted from the second tick;
+            // tick, line and pin take 2 cycles
             const int64_t passed = origin + bench.driver.count;
             const double ideal = double((__int128(passed * ONE - start) * period)) / double(slope);
-            jitter = std::max(jitter, std::fabs(double(clks - 2) - ideal));
-        }
+            jitter = std::max(jitter, std::fabs(double(clks - 2 - period) - ideal));
+        });
     }
     const double required = double(slope) / double(ONE) / double(period),
                  measured = double(edges - 1) / double(last - first);

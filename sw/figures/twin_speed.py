@@ -13,6 +13,7 @@ from twin import Axis, Node, Twin, realtime_factor
 from twin.nodes.twin import CLK_HZ
 
 MOST_AXES = 8
+GROWTH_CLK_HZ = 12_000_000  # a servo tick has the cycles for all axes
 STARTED_S = 0.1  # simulated, until the firmware polls its axes
 ROUNDS = 5
 
@@ -29,7 +30,7 @@ def cycle_times_ns(axes: Sequence[int], cycles: int, rounds: int) -> list[float]
     twins = [
         Twin(
             [Node(1, [Axis("stepper_stage")] * count)],
-            clk_hz=s2_stage.CLK_HZ,
+            clk_hz=GROWTH_CLK_HZ,
             node_parameters=s2_stage.NODE,
         )
         for count in axes

@@ -4,8 +4,6 @@
 REQUESTS = dict(
     check_following=("closed_loop", "fine"),
     play=("start", "common_start"),
-    rebase=("set_target_to_position", "moved"),
-    gains_changed=("kp_written", "kd_written", "kv_written", "ka_written"),
 )
 
 

@@ -33,7 +33,6 @@ SETTINGS = dict.fromkeys(
         "trim_scale",
         "quantum",
         "start_at",
-        "shift_by",
         "segment_velocity",
         "segment_acceleration",
         "segment_jerk",
@@ -134,6 +133,7 @@ class Filter:
 class Axis:
     def __init__(self, filters=0):
         self.settings = dict(SETTINGS)
+        self.shift_by = 0  # of the last shift
         self.filters = [Filter() for _ in range(filters)]
         self.reset()
 
@@ -192,7 +192,7 @@ class Axis:
             self.moving = 1
 
     def shift(self):
-        by = self.settings["shift_by"]
+        by = self.shift_by
         self.anchor, self.target = self.anchor + by, self.target + by
         self.last_position, self.run = self.last_position + by, self.run + by
         self.rebased = 1

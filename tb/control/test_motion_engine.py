@@ -35,7 +35,7 @@ STROBES = dict(
 LEVELS = ("block_up", "block_down", "closed_loop")
 IDLE = dict.fromkeys(
     ("tick", "now", "setting_write", "setting_axis", "setting_word", "setting_filter", "setting")
-    + ("position", "stepped", "downward", *LEVELS, *STROBES.values()),
+    + ("position", "stepped", "downward", "shift_by", *LEVELS, *STROBES.values()),
     0,
 )
 
@@ -69,6 +69,11 @@ class Engine:
                 filters=[([0] * 5, 0)] * int(self.dut.FILTERS.value),
             )
         return self
+
+    def shift_by(self, n, by):
+        """The amount of the next shift of axis n."""
+        self.models[n].shift_by = by
+        self.dut.shift_by.value = by & (1 << 48) - 1
 
     async def drive_levels(self):
         for name in LEVELS:
@@ -280,8 +285,8 @@ async def latency_is_at_most_the_cycles_that_the_engine_states(dut):
         stop_jerk=1 << 20,
         following_limit=5,
         start_at=0,
-        shift_by=-(5 << 16),
     )
+    shift_by = -(5 << 16)
     for n in range(engine.axes):
         await engine.settings(n, **settings)
         if engine.models[n].filters:
@@ -297,7 +302,8 @@ async def latency_is_at_most_the_cycles_that_the_engine_states(dut):
     for n in range(engine.axes):
         await engine.request(n, "stop")
         await engine.request(n, "arm")
-        engine.position[n] += settings["shift_by"]
+        engine.position[n] += shift_by
+        engine.shift_by(n, shift_by)
     engine.dut.position.value = sum(
         (p & (1 << 48) - 1) << 48 * n for n, p in enumerate(engine.position)
     )
@@ -409,7 +415,8 @@ async def a_controlled_stop_ends_at_standstill_within_its_limits(dut):
 async def a_shift_of_the_origin_never_disturbs_the_error(dut):
     engine = await Engine(dut).reset()
     by = -(3 << 16)
-    await engine.settings(0, shift_by=by, kp=1 << 16, output_limit=1 << 30)
+    engine.shift_by(0, by)
+    await engine.settings(0, kp=1 << 16, output_limit=1 << 30)
     await engine.play(0, (PERIOD, 0, 0, 9, 1))
     for wait in range(4):
         await engine.clk(strobes=dict(shift=1))
@@ -556,8 +563,8 @@ async def random_ticks(engine, ticks, realistic):
             if random.random() < 0.15:
                 await engine.request(n, random.choice(("start", "start", "stop", "set")))
             if random.random() < 0.05:
-                await engine.settings(n, shift_by=signed(40))
-                engine.position[n] += model.settings["shift_by"]
+                engine.shift_by(n, signed(40))
+                engine.position[n] += model.shift_by
                 engine.dut.position.value = sum(
                     (p & (1 << 48) - 1) << 48 * m for m, p in enumerate(engine.position)
                 )

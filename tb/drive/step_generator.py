@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/drive/step_generator.sv in integers: clk(...) advances one cycle and returns (step,
-direction, steps, overrun) after it.
+direction, steps, overrun, stopped) after it.
 """
 
 STEP_DIRECTION, QUADRATURE = 0, 1
@@ -10,30 +10,41 @@ def signed(value, bits):
     return (value + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
 
 
+class Age:
+    """Cycles since something began; it stops at its limit, and reset is long ago."""
+
+    def __init__(self, bits):
+        self.cycles = (1 << bits) - 1
+
+    def over(self, limit):
+        return self.cycles & limit == limit
+
+    def clk(self, begins, over):
+        self.cycles = 1 if begins else self.cycles + (not over)
+
+
 class StepGenerator:
-    def __init__(self, period_w=18, ahead_w=6):
-        self.period_w, self.bits = period_w, period_w + ahead_w + 16
+    def __init__(self, time_w=14, rate_f=36, ahead_w=10):
+        self.time_w, self.rate_f, self.bits = time_w, rate_f, rate_f + ahead_w
         self.reset()
 
-    def reset(self, target=0):
-        self.line_cycles = 0
-        self.level_timer = self.direction_timer = 0  # cycles left after the next
-        self.pulse = self.upward = self.turning = self.rewired = False
+    def reset(self):
+        self.level_age, self.direction_age = Age(self.time_w), Age(self.time_w)
+        self.pulse = self.upward = self.turning = self.rewired = self.overrun = False
         self.quarter = self.steps = 0
         self.wiring = (0, 0, 0)  # mode, step_low and direction_low in force
         self.pins = (0, 0)
-        self.restart(target)
+        self.stopped = True
+        self.next = (0, 0, 0)  # rate, restart, steep
+        self.restart()
         return self.shown()
 
-    def restart(self, target):
-        self.line_end = target >> 16 << 16
-        self.left = 0  # cycles left of the line, after the next
-        self.slope = self.ahead = 0
-        self.waiting = self.reverses = self.overrun = False
-        self.acted = self.upward
+    def restart(self):
+        self.rate = 0
+        self.ahead, self.reverses, self.acted = 0, False, self.upward
 
     def shown(self):
-        return *self.pins, signed(self.steps, 32), int(self.overrun)
+        return *self.pins, signed(self.steps, 32), int(self.overrun), int(self.stopped)
 
     def levels(self):
         """The levels of the pins in this state."""
@@ -49,7 +60,6 @@ class StepGenerator:
     def clk(
         self,
         rst=0,
-        period=0,
         high_cycles=0,
         low_cycles=0,
         setup_cycles=0,
@@ -58,15 +68,24 @@ class StepGenerator:
         step_low=0,
         direction_low=0,
         enable=0,
-        load=0,
-        tick=0,
-        target=0,
+        line_start=0,
+        line_idle=0,
+        rate_valid=0,
+        rate=0,
+        rate_restart=0,
+        rate_steep=0,
     ):
+        _, next_restart, next_steep = self.next
         if rst:
-            return self.reset(target)
-        follows_target = enable and not load and self.line_cycles > 0
-        follows = follows_target and not (self.overrun or self.acted or self.rewired)
-        level_over, direction_over = self.level_timer <= 0, self.direction_timer <= 0
+            self.reset()
+            if rate_valid:
+                self.next = (rate, rate_restart, rate_steep)
+            return self.shown()
+        begins = line_start and next_restart
+        restarts = not enable or self.stopped or begins
+        follows = not (restarts or self.overrun or self.acted or self.rewired)
+        level_over = self.level_age.over(high_cycles if self.pulse else low_cycles)
+        direction_over = self.direction_age.over(setup_cycles if self.turning else hold_cycles)
         due = (self.ahead >= 0) == self.upward
         may_step = level_over and (direction_over or not self.turning)
         rise = follows and not self.pulse and due and may_step
@@ -77,36 +96,32 @@ class StepGenerator:
         rewires = standstill and wiring != self.wiring
 
         # the line
-        whole = self.line_cycles << 16
-        moved = signed(self.ahead + (-whole if self.upward == self.acted else whole), self.bits)
-        self.reverses = not self.acted and (moved < 0) == self.upward
+        one = 1 << self.rate_f
         top = 1 << self.bits - 2
-        too_steep = not -1 << self.period_w + 16 <= self.slope < 1 << self.period_w + 16
-        self.overrun = self.overrun or too_steep or not -top <= self.ahead < top
-        self.ahead = signed((moved if self.acted else self.ahead) + self.slope, self.bits)
+        if not restarts and (line_start and next_steep or not -top <= self.ahead < top):
+            self.overrun = True
+        if not enable or begins:
+            self.overrun = False
+        behind = self.ahead < -one if self.upward else self.ahead >= one
+        self.reverses = not self.acted and behind
+        back = self.acted * (-one if self.upward else one)
+        self.ahead = signed(self.ahead + back + self.rate, self.bits)
         self.acted = rise or turns
-        if (tick or self.waiting) and self.left <= 0:
-            self.slope, self.line_end = signed(target - self.line_end, 48), target
-            self.left, self.waiting = self.line_cycles - 1, False
-        else:
-            self.slope = 0 if self.left <= 0 else self.slope
-            self.left, self.waiting = self.left - 1, bool(tick or self.waiting)
+        if line_start:
+            self.rate, self.next = self.next[0], (0, 0, 0)
+        if line_idle:
+            self.rate = 0
+        if rate_valid:
+            self.next = (rate, rate_restart, rate_steep)
+        if not enable or begins:
+            self.stopped = not enable
         upward = self.upward
-        if not follows_target:
-            self.restart(target)
-            self.line_cycles = period
+        if restarts:
+            self.restart()
 
         # the pins
-        self.level_timer = (
-            (high_cycles if rise else low_cycles) - 1
-            if rise or fall or self.rewired
-            else self.level_timer - 1
-        )
-        self.direction_timer = (
-            (hold_cycles if fall else setup_cycles) - 1
-            if fall or turns or self.rewired
-            else self.direction_timer - 1
-        )
+        self.level_age.clk(rise or fall or self.rewired, level_over)
+        self.direction_age.clk(fall or turns or self.rewired, direction_over)
         self.steps += (1 if upward else -1) * rise
         self.quarter += (1 if upward else -1) * rise
         self.pulse = rise or (self.pulse and not fall)

@@ -2,8 +2,7 @@
 """Model of rtl/drive/step_permission.sv."""
 
 
-def permission(enable, by_steps, block_up, block_down, target_velocity):
-    """Return (driven, allowed): a stepper drive is on; its target may be followed."""
-    driven = enable and by_steps
-    blocked = target_velocity > 0 and block_up or target_velocity < 0 and block_down
-    return int(driven), int(driven and not blocked)
+def permission(enable, by_steps, block_up, block_down, target_up, target_down):
+    """Whether the target may be followed."""
+    blocked = target_up and block_up or target_down and block_down
+    return int(enable and by_steps and not blocked)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """step_generator: edges by hand in every mode, timings on the pins, no lost steps, and random lines
-against the model in every cycle.
+against the model in every cycle. The rates of the lines are those of step_lines.
 """
 
 import csv
@@ -15,11 +15,12 @@ from cocotb.triggers import FallingEdge, RisingEdge
 
 from tb.bench import ROOT, run, start
 from tb.drive.step_generator import StepGenerator
+from tb.drive.step_lines import TOO_FAR, rate_of, wrapped
 
-PERIOD_W, TIME_W, AHEAD_W = 8, 5, 4
+TIME_W, RATE_F, AHEAD_W = 5, 26, 6
 ONE = 1 << 16
+PERIOD = 20  # cycles of a line, unless a test says otherwise
 IDLE = dict(
-    period=20,
     high_cycles=1,
     low_cycles=1,
     setup_cycles=2,
@@ -28,10 +29,9 @@ IDLE = dict(
     step_low=0,
     direction_low=0,
     enable=0,
-    load=0,
-    tick=0,
-    target=0,
+    line_idle=1,
 )
+ONCE = dict.fromkeys(("line_start", "rate_valid", "rate", "rate_restart", "rate_steep"), 0)
 WAVEFORM = ROOT / "build" / "step_generator.csv"
 RECORDING = ROOT.parent / "shared" / "captures" / "smoothieware_steps.csv"
 SLOWER = 50  # samples of the recording per cycle
@@ -44,59 +44,77 @@ class Generator:
     """
 
     def __init__(self, dut):
-        self.dut, self.model, self.inputs, self.seen = (
-            dut,
-            StepGenerator(PERIOD_W, AHEAD_W),
-            dict(IDLE),
-            [],
-        )
+        self.dut, self.model = dut, StepGenerator(TIME_W, RATE_F, AHEAD_W)
+        self.inputs, self.seen = dict(IDLE), []
 
-    async def reset(self, **inputs):
+    async def reset(self, target=0, period=PERIOD, **inputs):
+        self.period = period
         self.inputs.update(inputs)
-        await start(self.dut, **self.inputs)
+        await start(self.dut, **self.inputs, **ONCE)
         await FallingEdge(self.dut.clk)
-        self.model.reset(self.inputs["target"])
+        self.model.reset()
         await self.wait(10)
         self.inputs["enable"] = 1
-        await self.clk()
+        await self.begin(target)
         self.seen = []
         return self
 
-    async def clk(self, **inputs):
+    async def clk(self, rst=0, **inputs):
+        once = ONCE | {name: inputs.pop(name) for name in ONCE if name in inputs}
         self.inputs.update(inputs)
-        once = dict(self.inputs, rst=self.inputs.pop("rst", 0))
-        for name, level in once.items():
+        levels = self.inputs | once | dict(rst=rst)
+        for name, level in levels.items():
             getattr(self.dut, name).value = level
-        self.inputs.update(tick=0, load=0)
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
-        got = tuple(int(port.value) for port in (self.dut.step, self.dut.direction)) + (
-            self.dut.steps.value.to_signed(),
-            int(self.dut.overrun.value),
+        dut = self.dut
+        ports = (dut.overrun, dut.stopped)
+        got = (
+            *(int(dut.step.value), int(dut.direction.value), dut.steps.value.to_signed()),
+            *(int(port.value) for port in ports),
         )
-        want = self.model.clk(**once)
+        want = self.model.clk(**levels)
         assert got == want, (
-            f"{once}: step, direction, steps, overrun are {got}, the model has {want}"
+            f"{levels}: step, direction, steps, overrun, stopped are {got}, the model has {want}"
         )
         self.seen.append(got[:2])
-        return got
+        return got[:4]
 
     async def wait(self, clks):
         for _ in range(clks):
             got = await self.clk()
         return got
 
+    async def begin(self, target):
+        """The line begins at the whole step below target (in 2^-16 step)."""
+        self.end, self.rest = target >> 16 << 16, self.period - 1
+        await self.clk(rate_valid=1, rate_restart=1)
+        await self.clk(line_start=1)
+
     async def line(self, target, clks=None):
-        """Tick with this target (in steps), wait for the next tick; return what the pins showed."""
+        """Give the rate of a line to target (in steps), and draw it for its period; return what the
+        pins showed. The line begins in the second cycle.
+        """
         first = len(self.seen)
-        await self.clk(tick=1, target=int(target * ONE))
-        if (clks or self.inputs["period"]) > 1:
-            await self.wait((clks or self.inputs["period"]) - 1)
+        target = int(target * ONE)
+        distance = wrapped(target - self.end)
+        found = rate_of(distance, self.rest, self.period, RATE_F)
+        if found is TOO_FAR:
+            await self.clk(rate_valid=1, rate_steep=1)
+        else:
+            rate, self.rest = found
+            await self.clk(rate_valid=1, rate=rate)
+        self.end = target
+        await self.clk(line_start=1, line_idle=0)
+        await self.wait(self.period - 1)
+        self.inputs["line_idle"] = 1
+        if clks:
+            await self.wait(clks)
         return self.seen[first:]
 
 
 def rises(levels, before=0):
-    """Cycles after the tick in which a level is high and was low before."""
+    """Cycles, counted from 1, in which a level is high and was low before."""
     return [
         clk
         for clk, level in enumerate(levels, start=1)
@@ -106,23 +124,23 @@ def rises(levels, before=0):
 
 @cocotb.test()
 async def the_edges_of_a_line_are_as_drawn_by_hand(dut):
-    generator = await Generator(dut).reset(target=0, period=20)
+    generator = await Generator(dut).reset()
     await generator.line(1)  # turns upward, one step at its end
     pins = await generator.line(5) + await generator.line(5)
     assert [clk for clk in rises([step for step, _ in pins]) if clk > 2] == [
         5,
-        7,
-        12,
-        17,
-        22,
+        8,
+        13,
+        18,
+        23,
     ]  # the first had to turn
     assert all(direction for _, direction in pins[4:])
     pins = await generator.line(3) + await generator.line(3)
     assert rises([step for step, _ in pins]) == [
-        6,
-        13,
+        7,
+        14,
     ]  # below 5 after 1 cycle, but it turns first; below 4 after 11
-    assert [direction for _, direction in pins].index(0) == 3
+    assert [direction for _, direction in pins].index(0) == 4
     assert (await generator.clk())[2] == 3
 
 
@@ -130,16 +148,14 @@ async def the_edges_of_a_line_are_as_drawn_by_hand(dut):
 async def latency_is_1_from_the_line_passing_a_step_to_the_edge(dut):
     for target, latency in ((Fraction(1), 20), (Fraction(2), 10), (Fraction(4), 5)):
         generator = await Generator(dut).reset(target=0)
-        await generator.line(Fraction(1, ONE))  # it may turn upward here
-        await generator.clk(load=1, target=0)
-        generator.model.upward or await generator.line(1)
+        await generator.line(1)  # it turns upward here
         await generator.wait(5)
-        await generator.clk(load=1, target=0)
+        await generator.begin(0)
         await generator.wait(5)
         pins = await generator.line(target) + await generator.line(target)
         first = rises([step for step, _ in pins])[0]
-        assert first - 2 == latency, (
-            "tick, then `latency` cycles of the line, then 1 cycle to the pin"
+        assert first - 3 == latency, (
+            "rate and start, then `latency` cycles of the line, then 1 cycle to the pin"
         )
 
 
@@ -213,7 +229,7 @@ async def quadrature_has_one_edge_per_step_and_a_leads_going_up(dut):
     generator = await Generator(dut).reset(target=0, mode=1, high_cycles=2, low_cycles=2, period=40)
     gray = [(0, 0), (1, 0), (1, 1), (0, 1)]
     for target in (9, 4, -7, -7):
-        await generator.line(target, 80)
+        await generator.line(target, 40)
     place = 0
     since = 100
     for before, after in zip(generator.seen, generator.seen[1:]):
@@ -256,22 +272,24 @@ async def enable_low_finishes_the_pulse_and_enable_high_again_does_not_jump(dut)
     await generator.line(4)
     while not generator.seen[-1][0]:
         await generator.clk()
-    pins = [await generator.clk(enable=0, target=900 * ONE) for _ in range(60)]
+    pins = [await generator.clk(enable=0) for _ in range(60)]
     assert [pin[0] for pin in pins] == [1] * 5 + [0] * 55  # the pulse was 6 cycles long
     made = pins[-1][2]
     await generator.clk(enable=1)
+    await generator.line(880)  # its rate is ignored
+    await generator.begin(900 * ONE)
     for target in (900, 900, 903, 903):
         await generator.line(target)
     assert (await generator.clk())[2] == made + 3
 
 
 @cocotb.test()
-async def load_makes_no_step(dut):
+async def a_restart_makes_no_step(dut):
     generator = await Generator(dut).reset(target=0, period=40)
     for target in (3, 3):
         await generator.line(target)
     for target in (-(2**31), 2**31 - 1, 7):
-        await generator.clk(load=1, target=target * ONE)
+        await generator.begin(target * ONE)
         await generator.line(target)
         assert (await generator.line(target))[-1][0] == 0 and generator.model.steps == 3
     await generator.line(9)
@@ -288,20 +306,18 @@ async def it_takes_the_shortest_distance_across_the_wrap_of_target(dut):
 
 
 @cocotb.test()
-async def overrun_rises_when_target_runs_away_and_only_load_reset_or_enable_low_ends_it(dut):
-    for jump in (256, -257, 30000, 2**31 - 1):  # 256: 2^PERIOD_W
-        generator = await Generator(dut).reset(target=0, period=40)
+async def overrun_rises_when_target_runs_away_and_only_restart_reset_or_enable_low_ends_it(dut):
+    for jump in (40, -41, 30000, 2**31 - 1):  # 40: a step per cycle
+        generator = await Generator(dut).reset(period=40)
         await generator.line(jump)
         got = await generator.line(jump)
         assert (await generator.clk())[3] and len({step for step, _ in got[4:]}) == 1
-        assert not (await generator.clk(load=1))[3]
-        await generator.line(jump)
-        await generator.line(-jump // 2)
+        await generator.begin(jump * ONE)
+        assert not (await generator.clk())[3]
+        await generator.line(jump - 90)
         assert (await generator.clk())[3] and not (await generator.clk(rst=1))[3]
-    generator = await Generator(dut).reset(
-        target=0, period=200, high_cycles=30
-    )  # 2^(PERIOD_W + AHEAD_W - 2) / 200 = 5.1 steps
-    await generator.line(4)
+    generator = await Generator(dut).reset(period=200, high_cycles=30)
+    await generator.line(10)  # 2^(AHEAD_W - 2): 16 steps may be still to be made
     assert not (await generator.wait(200))[3]
     await generator.line(40)
     assert (await generator.wait(50))[3]
@@ -309,47 +325,52 @@ async def overrun_rises_when_target_runs_away_and_only_load_reset_or_enable_low_
 
 
 @cocotb.test()
-async def a_tick_that_comes_too_soon_waits_and_nothing_is_lost(dut):
-    generator = await Generator(dut).reset(target=0, period=60)
-    target = 0
-    for _ in range(60):
-        target += random.randrange(-4, 8)
-        await generator.line(target, random.randrange(1, 90))
-    assert (await generator.wait(150))[2:] == (target, 0)
-
-
-@cocotb.test()
-async def with_a_period_of_0_nothing_moves(dut):
-    generator = await Generator(dut).reset(target=0, period=0)
-    for target in (0, 5, -5):
-        await generator.line(target, 20)
-    assert set(generator.seen) == {(0, 0)}
+async def a_line_ends_with_line_idle_and_another_may_follow_at_once(dut):
+    generator = await Generator(dut).reset()
+    await generator.line(1)
+    rate = ONCE | dict(rate_valid=1, rate=1 << RATE_F - 2)
+    await generator.clk(**rate)
+    await generator.clk(line_start=1, line_idle=0)
+    await generator.clk(**rate)
+    await generator.wait(18)
+    await generator.clk(line_start=1)  # 20 cycles of a quarter step
+    await generator.wait(19)
+    await generator.clk(line_idle=1)
+    assert (await generator.wait(40))[2] == 1 + 5 + 5
 
 
 @cocotb.test()
 async def reset_in_a_line_clears_pins_and_steps(dut):
     generator = await Generator(dut).reset(target=0, period=20, high_cycles=3)
     for wait in range(20):
-        await generator.line(generator.model.line_end // ONE + 4, 3 + wait)
+        await generator.line(generator.end // ONE + 4)
+        await generator.line(generator.end // ONE + 4)
+        for _ in range(wait):
+            await generator.clk()
         assert await generator.clk(rst=1) == (0, 0, 0, 0)
         assert (await generator.wait(30))[2] == 0
+        await generator.begin(0)
 
 
 @cocotb.test()
 async def any_lines_match_the_model(dut):
-    generator = await Generator(dut).reset(period=30)
-    target, speed = 0, 0
+    generator = await Generator(dut).reset()
+    fastest = 1 << RATE_F
     for _ in range(25_000):
         inputs = {}
-        if random.randrange(generator.inputs["period"] + 2) == 0:
-            if random.randrange(4) == 0:
-                speed = random.choice(
-                    (0, 1, -1, random.randrange(-ONE, ONE), random.randrange(-20 * ONE, 20 * ONE))
-                )
-            if random.randrange(300) == 0:
-                speed = random.randrange(-(2**47), 2**47)
-            target = (target + speed + 2**47) % 2**48 - 2**47
-            inputs.update(tick=1, target=target)
+        if random.randrange(20) == 0:
+            rate = random.choice(
+                (0, 1, -1, -fastest, fastest - 1, random.randrange(-fastest, fastest) >> 1)
+            )
+            inputs.update(
+                rate_valid=1,
+                rate=rate >> random.choice((0, 0, 1, 4)),
+                rate_restart=int(random.randrange(4) == 0),
+                rate_steep=int(random.randrange(40) == 0),
+            )
+        if random.randrange(30) == 0:
+            inputs.update(line_start=1)
+        inputs.update(line_idle=int(random.randrange(30) == 0))
         for name in ("high_cycles", "low_cycles", "setup_cycles", "hold_cycles"):
             if random.randrange(300) == 0:
                 inputs[name] = random.choice((0, 1, 2, 31, random.randrange(8)))
@@ -360,15 +381,8 @@ async def any_lines_match_the_model(dut):
                 direction_low=random.getrandbits(1),
             )
         if random.randrange(200) == 0:
-            inputs.update(
-                enable=int(random.randrange(3) > 0),
-                period=random.choice((0, 1, 2, 7, 30, 30, 30, 255)),
-            )
-        if random.randrange(500) == 0:
-            inputs["load"] = 1
-        if random.randrange(3000) == 0:
-            inputs["rst"] = 1
-        await generator.clk(**inputs)
+            inputs.update(enable=int(random.randrange(3) > 0))
+        await generator.clk(rst=int(random.randrange(3000) == 0), **inputs)
 
 
 @cocotb.test()
@@ -391,7 +405,7 @@ def recorded():
     edges = [sample for (_, before), (sample, step) in zip(rows, rows[1:]) if step > before][
         :RECORDED
     ]
-    period = SLOWER * IDLE["period"]
+    period = SLOWER * PERIOD
     times = range(edges[0] - period, edges[-1] + period, period)
     places = [sum(edge <= time for edge in edges) for time in times]
     return places + places[::-1]
@@ -411,7 +425,7 @@ async def follows_a_recorded_machine_there_and_back(dut):
 
 
 def test_step_generator():
-    run("step_generator", __file__, PERIOD_W=PERIOD_W, TIME_W=TIME_W, AHEAD_W=AHEAD_W)
+    run("step_generator", __file__, TIME_W=TIME_W, RATE_F=RATE_F, AHEAD_W=AHEAD_W)
 
 
 def test_sigrok_counts_the_same_steps():
@@ -419,7 +433,7 @@ def test_sigrok_counts_the_same_steps():
     program = shutil.which("sigrok-cli")
     if not program:
         pytest.skip("no sigrok-cli")
-    run("step_generator", __file__, PERIOD_W=PERIOD_W, TIME_W=TIME_W, AHEAD_W=AHEAD_W)
+    run("step_generator", __file__, TIME_W=TIME_W, RATE_F=RATE_F, AHEAD_W=AHEAD_W)
     result = subprocess.run(
         [
             program,

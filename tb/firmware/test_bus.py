@@ -9,7 +9,7 @@ import pytest
 from tables.bus import register_fields
 from tb.bench import seed
 from twin.build import ROOT
-from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, FakeNode
+from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, CompiledNode
 
 COMMAND = DEFINES["BUS_RECEIVE_COMMAND_MASK"]
 GOOD = DEFINES["BUS_RECEIVE_GOOD_MASK"]
@@ -39,11 +39,11 @@ def cause_of(machine, body):
 
 
 def test_before_any_request_the_reply_is_ok_of_sequence_0():
-    assert FakeNode().reply() == bytes([0, 0, 0])
+    assert CompiledNode().reply() == bytes([0, 0, 0])
 
 
 def test_a_known_exchange_byte_by_byte():
-    machine = FakeNode(address=2)
+    machine = CompiledNode(address=2)
     sent = machine.receive([0x22 | COMMAND])
     assert sent == b"\x62"
     frame = bytes([2, 7, OPERATION["counters"]])
@@ -57,7 +57,7 @@ def test_a_known_exchange_byte_by_byte():
 
 
 def test_identify_reports_the_build():
-    answer = FakeNode(Axis(), Axis(), address=13).ask("identify")
+    answer = CompiledNode(Axis(), Axis(), address=13).ask("identify")
     assert (
         answer["map_crc"] == DEFINES["MAP_CRC"] and answer["address"] == 13 and answer["axes"] == 2
     )
@@ -66,7 +66,7 @@ def test_identify_reports_the_build():
 
 
 def test_every_operation_of_another_length_is_refused():
-    machine = FakeNode()
+    machine = CompiledNode()
     for name in OPERATION:
         for body in (example(name) + b"\0", example(name)[:-1]):
             if len(body) > 1:
@@ -75,13 +75,13 @@ def test_every_operation_of_another_length_is_refused():
 
 
 def test_an_operation_that_does_not_exist_is_refused():
-    machine = FakeNode()
+    machine = CompiledNode()
     for code in set(range(256)) - set(OPERATION.values()):
         assert cause_of(machine, bytes([code, code])) == CODE["unknown_operation"]
 
 
 def test_an_axis_that_does_not_exist_is_refused():
-    machine = FakeNode(Axis(), Axis())
+    machine = CompiledNode(Axis(), Axis())
     for name in WITH_AXIS:
         for axis in (2, 7, 255):
             assert cause_of(machine, example(name, axis=axis)) == CODE["no_such_axis"], name
@@ -90,7 +90,7 @@ def test_an_axis_that_does_not_exist_is_refused():
 
 def test_with_another_map_only_identify_is_answered_and_no_axis_is_touched():
     axis = Axis()
-    machine = FakeNode(axis, map_crc=DEFINES["MAP_CRC"] ^ 1)
+    machine = CompiledNode(axis, map_crc=DEFINES["MAP_CRC"] ^ 1)
     for name in OPERATION:
         assert cause_of(machine, example(name)) == (0 if name == "identify" else CODE["wrong_map"])
     machine.run(20)
@@ -99,7 +99,7 @@ def test_with_another_map_only_identify_is_answered_and_no_axis_is_touched():
 
 
 def test_a_repeated_frame_is_not_acted_on_again():
-    machine = FakeNode()
+    machine = CompiledNode()
     body = example("set_parameter", parameter=PARAMETER["kp"]["id"], value=5)
     machine.send(body)
     machine.set(kp=6)
@@ -115,7 +115,7 @@ def test_a_repeated_frame_is_not_acted_on_again():
 
 
 def test_the_same_sequence_number_with_other_content_is_acted_on():
-    machine = FakeNode()
+    machine = CompiledNode()
     for value in (5, 6):
         machine.send(example("set_parameter", parameter=PARAMETER["kp"]["id"], value=value))
         assert machine.axes[0].word[DEFINES["AXIS_KP"]] == value
@@ -123,7 +123,7 @@ def test_the_same_sequence_number_with_other_content_is_acted_on():
 
 
 def test_frames_that_the_hardware_did_not_mark_good_change_nothing():
-    machine = FakeNode()
+    machine = CompiledNode()
     machine.ask("identify")
     before = machine.reply()
     words = machine.frame(example("set_parameter", parameter=PARAMETER["kp"]["id"], value=5))
@@ -142,7 +142,7 @@ def test_frames_that_the_hardware_did_not_mark_good_change_nothing():
 
 def test_nonsense_on_the_bus_never_stops_the_node():
     draw = random.Random(seed())
-    machine = FakeNode()
+    machine = CompiledNode()
     for _ in range(300):
         machine.receive(
             [
@@ -154,14 +154,14 @@ def test_nonsense_on_the_bus_never_stops_the_node():
 
 
 def test_refusals_are_counted():
-    machine = FakeNode()
+    machine = CompiledNode()
     for n in range(5):
         cause_of(machine, bytes([n, 77]))
     assert machine.ask("counters")["refused"] == 5
 
 
 def test_counters_come_from_the_bus_registers():
-    machine = FakeNode()
+    machine = CompiledNode()
     names = (
         "frames_good",
         "frames_bad",
@@ -183,7 +183,7 @@ PARTNER = {"step_output": "position_source", "fine_reach": "drive"}
 
 
 def test_every_parameter_accepts_both_ends_of_its_range_and_nothing_beyond():
-    machine = FakeNode()
+    machine = CompiledNode()
     for name, parameter in PARAMETER.items():
         assert (
             machine.ask("get_parameter", axis=0, parameter=parameter["id"])["value"]
@@ -207,7 +207,7 @@ def test_every_parameter_accepts_both_ends_of_its_range_and_nothing_beyond():
 
 @pytest.mark.parametrize("number", [0, len(PARAMETER) + 1, 255])
 def test_a_parameter_that_does_not_exist_is_refused(number):
-    machine = FakeNode()
+    machine = CompiledNode()
     assert machine.request("get_parameter", axis=0, parameter=number)[0] == "unknown_parameter"
     assert (
         machine.request("set_parameter", axis=0, parameter=number, value=1)[0]
@@ -216,7 +216,7 @@ def test_a_parameter_that_does_not_exist_is_refused(number):
 
 
 def test_start_writes_the_defaults_into_the_registers():
-    machine = FakeNode()
+    machine = CompiledNode()
     word, actuator, d = machine.axes[0].word, machine.actuators[0], DEFINES
     default = {name: parameter["default"] for name, parameter in PARAMETER.items()}
     for name in (
@@ -225,13 +225,14 @@ def test_start_writes_the_defaults_into_the_registers():
         "kd",
         "kv",
         "ka",
+        "output_limit",
+        "integral_limit",
         "dead_band",
         "following_limit",
         "disagreement_limit",
         "encoder_fault_mask",
     ):
         assert word[d["AXIS_" + name.upper()]] == default[name]
-    assert word[d["AXIS_SERVO_LIMITS"]] == default["output_limit"] | default["integral_limit"] << 15
     assert (
         word[d["AXIS_AMPLITUDE_WINDOW"]]
         == default["amplitude_low"] | default["amplitude_high"] << 16
@@ -239,7 +240,7 @@ def test_start_writes_the_defaults_into_the_registers():
     assert (
         word[d["AXIS_SENSING"]]
         == CLK_HZ // 100_000 | default["outlier_step"] << 16 | default["outlier_hold"] << 24
-    )  # 10 us
+    )  # 10 us, a sample in each cycle
     assert actuator[d["ACTUATOR_PWM_PERIOD"]] == CLK_HZ // 20_000 and word[d["AXIS_CONTROL"]] == 0
     assert word[d["AXIS_STOP_DECELERATION"]] == 125_000 * 2**40 // 4000**2 >> 8
     assert machine.word[d["BUS_BASE"] + d["BUS_BIT_TIME"]] == round(16 * CLK_HZ / 115_200)
@@ -252,7 +253,7 @@ def test_start_writes_the_defaults_into_the_registers():
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_parameter_with_a_register_goes_into_its_field_and_leaves_the_others(axis):
-    machine = FakeNode(Axis(), Axis())
+    machine = CompiledNode(Axis(), Axis())
     field = register_fields()
     checked = 0
     for name, parameter in PARAMETER.items():
@@ -272,13 +273,13 @@ def test_a_parameter_with_a_register_goes_into_its_field_and_leaves_the_others(a
 
 
 def test_values_too_large_for_a_register_saturate():
-    machine = FakeNode()
+    machine = CompiledNode()
     machine.set(acceleration=100_000_000)
     assert machine.axes[0].word[DEFINES["AXIS_STOP_DECELERATION"]] == 2**32 - 1
 
 
 def test_the_watchdog_time_is_one_for_all_axes():
-    machine = FakeNode(Axis(), Axis())
+    machine = CompiledNode(Axis(), Axis())
     machine.set(axis=1, watchdog_time=77)
     assert (
         machine.ask("get_parameter", axis=0, parameter=PARAMETER["watchdog_time"]["id"])["value"]
@@ -287,7 +288,7 @@ def test_the_watchdog_time_is_one_for_all_axes():
 
 
 def test_registers_are_read_by_address_but_never_a_queue():
-    machine = FakeNode()
+    machine = CompiledNode()
     assert (
         machine.ask("read_register", address=DEFINES["NODE_MAP_CRC"])["value"] == DEFINES["MAP_CRC"]
     )
@@ -325,14 +326,14 @@ def test_registers_are_read_by_address_but_never_a_queue():
 )
 @pytest.mark.parametrize("divisions", [1, 160, 65536])
 def test_counts_are_the_floor_of_position_times_n(position, divisions):
-    machine = FakeNode(Axis(position))
+    machine = CompiledNode(Axis(position))
     machine.set(counts_per_period=divisions)
     status = machine.status()
     assert status["position"] == position and status["counts"] == position * divisions // 65536
 
 
 def test_no_part_of_a_millisecond_is_lost():
-    machine = FakeNode()
+    machine = CompiledNode()
     start = machine.firmware.clock_ms()
     for _ in range(1000):
         machine.clk += 7 * CLK_HZ // 10_000
@@ -343,7 +344,7 @@ def test_no_part_of_a_millisecond_is_lost():
 
 
 def test_a_followed_position_is_new_at_each_read_until_the_next_request():
-    machine = FakeNode(Axis(), Axis(1000))
+    machine = CompiledNode(Axis(), Axis(1000))
     assert machine.ask("follow", axis=1)["position"] == 1000
     for position in (7, -1, 2**47 - 1):
         machine.axes[1].machine = position
@@ -367,7 +368,7 @@ def bit_time_of(baud):
 
 
 def test_the_baud_rate_changes_only_when_the_reply_has_been_sent():
-    machine = FakeNode()
+    machine = CompiledNode()
     body = example("set_baud", baud=500_000)
     machine.send(body)
     machine.run(10)
@@ -379,14 +380,14 @@ def test_the_baud_rate_changes_only_when_the_reply_has_been_sent():
 
 @pytest.mark.parametrize("baud", [0, 9599, CLK_HZ // 8 + 1, 3_000_001, 2**32 - 1])
 def test_a_baud_rate_out_of_range_is_refused(baud):
-    machine = FakeNode()
+    machine = CompiledNode()
     assert machine.request("set_baud", baud=baud)[0] == "out_of_range"
     machine.run(10)
     assert bit_time(machine) == bit_time_of(115_200)
 
 
 def test_a_break_or_a_silence_of_five_seconds_restores_the_first_baud_rate():
-    machine, breaks = FakeNode(), DEFINES["BUS_BASE"] + DEFINES["BUS_BREAKS"]
+    machine, breaks = CompiledNode(), DEFINES["BUS_BASE"] + DEFINES["BUS_BREAKS"]
     for _ in range(2):
         machine.ask("set_baud", baud=9600)
         machine.run(4999)
@@ -404,7 +405,7 @@ def test_a_break_or_a_silence_of_five_seconds_restores_the_first_baud_rate():
 
 
 def test_another_request_before_the_reply_was_read_cancels_the_baud_rate():
-    machine = FakeNode()
+    machine = CompiledNode()
     machine.send(example("set_baud", baud=9600))
     machine.send(bytes([10, OPERATION["identify"]]))
     machine.reply()
@@ -413,7 +414,7 @@ def test_another_request_before_the_reply_was_read_cancels_the_baud_rate():
 
 
 def test_the_encoder_is_reported_as_in_the_registers():
-    machine = FakeNode()
+    machine = CompiledNode()
     word, d = machine.axes[0].word, DEFINES
     word[d["AXIS_SAMPLE"]] = (-100 & 0xFFFF) | (-32768 & 0xFFFF) << 16
     word[d["AXIS_PHASE"]] = 0xFEDC | 101 << 16

@@ -3,7 +3,7 @@
 
 import pytest
 
-from twin.compiled.node import FAULT, PARAMETER, PERIOD, Axis, FakeNode
+from twin.compiled.node import FAULT, PARAMETER, PERIOD, Axis, CompiledNode
 
 OF_DRIVES = {
     "enable": dict(axis=0, on=1),
@@ -18,7 +18,7 @@ OF_DRIVES = {
 
 @pytest.fixture
 def machine():
-    return FakeNode(*[Axis() for _ in range(4)], address=1, image="counter")
+    return CompiledNode(*[Axis() for _ in range(4)], address=1, image="counter")
 
 
 @pytest.mark.parametrize("operation", OF_DRIVES)

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, TABLE, Axis, FakeNode
+from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, TABLE, Axis, CompiledNode
 
 BLOCK = DEFINES["FEEDBACK_BASE"]
 REASON = {code: name for name, (code, _) in TABLE["calibration_reason"].items()}
@@ -60,7 +60,7 @@ def calibration(machine, action="read", axis=0):
 
 def moving(signal=None, learning=True):
     """A machine that moves at 600 periods a second."""
-    machine = FakeNode()
+    machine = CompiledNode()
     machine.feedback_channels[0].burst = signal or Signal()
     machine.axes[0].speed = speed(600)
     machine.poll(30)
@@ -95,7 +95,7 @@ def test_at_power_up_nothing_is_corrected_or_calibrated():
 
 
 def test_the_parameters_of_the_user_reach_the_feedback_channel():
-    machine = FakeNode()
+    machine = CompiledNode()
     word = machine.feedback_channels[0].word
     assert (
         word[DEFINES["FEEDBACK_VELOCITY_QUANTUM"]] == 128
@@ -135,12 +135,24 @@ def test_the_parameters_of_the_user_reach_the_feedback_channel():
 
 
 def test_the_deglitcher_counts_samples_at_the_set_distance():
-    machine = FakeNode()
+    machine = CompiledNode()
     machine.set(
         deglitch=10_000, filter_skip=1000, filter_tolerated=3
     )  # 40 clk of 4 MHz; 4 clk left out: 5 clk a sample
     assert machine.feedback_channels[0].word[DEFINES["FEEDBACK_EDGE_FILTER"]] == 4 | 3 << 16
     assert machine.axes[0].word[DEFINES["AXIS_SENSING"]] & 0xFFFF == (40 + 4) // 5
+
+
+def test_a_long_deglitch_time_takes_samples_further_apart():
+    machine = CompiledNode()
+    for deglitch, skip, samples in (
+        (15_750, 0, 63),  # 63 clk of 4 MHz: a sample in each
+        (16_000, 1, 32),
+        (1_000_000, 63, 63),  # the longest one, 4000 clk
+    ):
+        machine.set(deglitch=deglitch)
+        assert machine.feedback_channels[0].word[DEFINES["FEEDBACK_EDGE_FILTER"]] == skip
+        assert machine.axes[0].word[DEFINES["AXIS_SENSING"]] & 0xFFFF == samples
 
 
 # ---- the calibration
@@ -263,7 +275,7 @@ def test_a_poll_takes_no_more_words_than_fit_its_time():
 
 
 def test_nothing_is_calibrated_while_an_axis_homes():
-    machine = FakeNode(Axis(low=-(10**7)), Axis())
+    machine = CompiledNode(Axis(low=-(10**7)), Axis())
     machine.feedback_channels[1].burst = Signal()
     machine.axes[1].speed = speed(600)
     machine.poll(100)
@@ -337,7 +349,7 @@ def test_the_operation_and_the_parameter_are_one_switch():
 
 
 def test_signal_faults_are_reported_and_cleared_with_the_faults():
-    machine = FakeNode()
+    machine = CompiledNode()
     channel = machine.feedback_channels[0]
     channel.word.update(
         {DEFINES["FEEDBACK_SIGNAL_FAULTS"]: 0x4001, DEFINES["FEEDBACK_FIRST_SIGNAL_FAULTS"]: 0x10}
@@ -349,7 +361,7 @@ def test_signal_faults_are_reported_and_cleared_with_the_faults():
 
 
 def test_only_index_capture_and_compare_may_be_written():
-    machine = FakeNode(Axis(), Axis())
+    machine = CompiledNode(Axis(), Axis())
     for axis in (0, 1):
         machine.ask("write_register", address=address("COMPARE_STEP_LOW", axis), value=0xDEADBEEF)
         assert (
@@ -397,7 +409,7 @@ def test_only_index_capture_and_compare_may_be_written():
 
 
 def test_the_burst_of_the_calibration_cannot_be_read_by_the_host():
-    machine = FakeNode()
+    machine = CompiledNode()
     assert (
         machine.request("read_register", address=address("RECORDER_WORD"))[0] == "no_such_register"
     )

@@ -4,7 +4,7 @@
 import pytest
 
 from tb.firmware.test_firmware_axis import CLOSED_LOOP, ENABLE, finish, homed
-from twin.compiled.node import DEFINES, FAULT, PARAMETER, PERIOD, Axis, FakeNode, signed
+from twin.compiled.node import DEFINES, FAULT, PARAMETER, PERIOD, Axis, CompiledNode, signed
 
 FINE = DEFINES["AXIS_CONTROL_FINE_MASK"]
 COMMAND = DEFINES["AXIS_COMMAND"]
@@ -159,7 +159,7 @@ def test_off_and_fault_end_it():
 
 
 def test_a_dac_that_drives_has_no_fine_stage():
-    machine = FakeNode(Coarse())
+    machine = CompiledNode(Coarse())
     for name, value, cause in (
         ("fine_reach", REACH, "ok"),
         ("drive", 2, "out_of_range"),

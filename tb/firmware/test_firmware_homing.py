@@ -8,7 +8,7 @@ import random
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import PARAMETER, PERIOD, Axis, FakeNode
+from twin.compiled.node import PARAMETER, PERIOD, Axis, CompiledNode
 
 QUARTER = PERIOD // 4
 COUNTS = 1  # position_source
@@ -23,7 +23,7 @@ TRAVEL = {
 
 def home(axis, method, source=COUNTS, **parameters):
     """How the homing ended, and the machine."""
-    machine = FakeNode(axis)
+    machine = CompiledNode(axis)
     machine.set(**{**TRAVEL, "home_method": method, "position_source": source, **parameters})
     machine.ask("enable", axis=0, on=1)
     machine.ask("home", axis=0)
@@ -116,8 +116,21 @@ def test_methods_17_and_18_take_the_edge_of_the_switch(method, low, high, sign, 
         if position is not None
     }
     ended, machine = home(Axis(position=start * PERIOD, **edges), method)
-    edge = sign * -70 * PERIOD + sign * PERIOD // 2  # where the switch of the fake node opens
+    edge = sign * -70 * PERIOD + sign * PERIOD // 2  # where the switch of the node opens
     assert ended == "ok" and 0 <= sign * (zero_of(machine) - edge) <= PERIOD
+
+
+def test_the_delay_of_the_poll_does_not_shift_the_edge_of_the_switch():
+    """The axis moves by more than half a period between two polls; the switch opens somewhere
+    between them.
+    """
+    late = []
+    for eighth in range(8):
+        low = -70 * PERIOD + eighth * PERIOD // 8
+        ended, machine = home(Axis(low=low), 17, homing_latch_speed=1000)
+        assert ended == "ok"
+        late.append((zero_of(machine) - low - PERIOD // 2) / PERIOD)
+    assert max(map(abs, late)) <= 0.4 and abs(sum(late) / len(late)) <= 0.15, late
 
 
 @pytest.mark.parametrize(("method", "switch", "sign"), [(1, "low", 1), (2, "high", -1)])
@@ -155,7 +168,7 @@ def test_methods_35_and_37_take_the_present_position(method):
 
 @pytest.mark.parametrize("method", [0, 3, 16, 19, 32, 36])
 def test_a_method_that_does_not_exist_is_refused(method):
-    machine = FakeNode()
+    machine = CompiledNode()
     known = PARAMETER["home_method"]
     assert (
         machine.request("set_parameter", axis=0, parameter=known["id"], value=method)[0]

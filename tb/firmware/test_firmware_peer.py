@@ -10,8 +10,8 @@ import zlib
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import CAUSE, PARAMETER, TABLE, Axis, FakeNode
-from twin.compiled.peripherals import FakePeripherals, I2c, PeerPort, Sensor, Table
+from twin.compiled.node import CAUSE, PARAMETER, TABLE, Axis, CompiledNode
+from twin.compiled.peripherals import I2c, PeerPort, PeripheralParts, Sensor, Table
 
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 PHASE = {code: name for name, (code, _) in TABLE["peer_phase"].items()}
@@ -31,7 +31,7 @@ AXIS = {
 }
 
 
-class Node(FakeNode):
+class Node(CompiledNode):
     """One of the two nodes; the test plays the other one, since the compiled firmware has its
     variables only once.
     """
@@ -42,7 +42,7 @@ class Node(FakeNode):
         self.sensor, self.port, self.i2c = Sensor(self.random, self.table), PeerPort(), I2c()
         self.settings = {"peer_mode": mode, "peer_role": role}
         super().__init__(
-            Axis(), image="station", peripherals=FakePeripherals(self.sensor, self.port, self.i2c)
+            Axis(), image="station", peripherals=PeripheralParts(self.sensor, self.port, self.i2c)
         )
         self.begin()
 

@@ -5,16 +5,16 @@ from fractions import Fraction
 
 import pytest
 
-from twin.compiled.node import PARAMETER, PERIOD, TABLE, Axis, FakeNode
-from twin.compiled.peripherals import FakePeripherals, NumericDisplay
+from twin.compiled.node import PARAMETER, PERIOD, TABLE, Axis, CompiledNode
+from twin.compiled.peripherals import NumericDisplay, PeripheralParts
 
 SETTING = TABLE["setting"]
 
 
-class Station(FakeNode):
+class Station(CompiledNode):
     def __init__(self, position=0):
         self.display = NumericDisplay()
-        super().__init__(Axis(position), image="station", peripherals=FakePeripherals(self.display))
+        super().__init__(Axis(position), image="station", peripherals=PeripheralParts(self.display))
 
     def shown(self, decimals):
         self.ask("set_setting", setting=SETTING["readout_decimals"]["id"], value=decimals)

@@ -3,7 +3,7 @@
 
 import pytest
 
-from twin.compiled.node import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, FakeNode
+from twin.compiled.node import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, CompiledNode
 
 TRIGGER = {name: code for name, (code, _) in TABLE["scope_trigger"].items()}
 SCOPE_STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}
@@ -35,7 +35,7 @@ def samples(machine):
 
 @pytest.fixture
 def machine():
-    made = FakeNode(Axis(), Axis(), address=1)
+    made = CompiledNode(Axis(), Axis(), address=1)
     for axis in (0, 1):
         made.set(axis, home_method=37, settle_time=1)
         made.ask("enable", axis=axis, on=1)

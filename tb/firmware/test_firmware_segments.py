@@ -5,7 +5,7 @@ with a zero, and it begins at the zero.
 
 import pytest
 
-from twin.compiled.node import CAUSE, DEFINES, PARAMETER, PERIOD, Axis, FakeNode
+from twin.compiled.node import CAUSE, DEFINES, PARAMETER, PERIOD, Axis, CompiledNode
 
 POINTS = [100 * n - 500 for n in range(30)]
 LENGTH, FIRST = 1000 * PERIOD, -2000 * PERIOD
@@ -29,7 +29,7 @@ def refused(machine, name, value):
 
 
 def homed(**more):
-    machine = FakeNode(Axis(position=5 * PERIOD))
+    machine = CompiledNode(Axis(position=5 * PERIOD))
     machine.set(home_method=37, **more)
     machine.ask("enable", axis=0, on=1)
     machine.ask("home", axis=0)
@@ -76,7 +76,7 @@ def test_the_table_counts_from_the_position_that_homing_finds_whatever_its_numbe
 
 
 def test_without_a_zero_the_table_is_not_in_force_and_the_reason_is_reported():
-    machine = FakeNode(Axis(position=0))
+    machine = CompiledNode(Axis(position=0))
     table(machine, segments=1)
     machine.poll(4)
     assert state(machine) == (30, 0, "not_homed") and machine.feedback_channels[0].use is None

@@ -5,14 +5,14 @@ image does not have it.
 
 import pytest
 
-from twin.compiled.node import TABLE, FakeNode
+from twin.compiled.node import TABLE, CompiledNode
 
 SETTING = TABLE["setting"]
 
 
 @pytest.fixture
 def station():
-    return FakeNode(image="station")
+    return CompiledNode(image="station")
 
 
 def test_each_setting_begins_at_its_default_and_takes_both_ends_of_its_range(station):
@@ -42,13 +42,13 @@ def test_a_setting_that_does_not_exist_is_refused(station, number):
 def test_an_operation_that_an_image_lacks_is_not_built(station):
     assert station.request("calibration", axis=0, action=0)[0] == "not_built"
     assert station.request("get_correction", axis=0)[0] == "not_built"
-    assert FakeNode().request("get_setting", setting=1)[0] == "not_built"
-    assert FakeNode().request("turn_to", angle=0)[0] == "not_built"
+    assert CompiledNode().request("get_setting", setting=1)[0] == "not_built"
+    assert CompiledNode().request("turn_to", angle=0)[0] == "not_built"
 
 
 def test_both_images_refuse_an_axis_that_does_not_exist(station):
     assert station.request("calibration", axis=1, action=0)[0] == "no_such_axis"
-    assert FakeNode().request("calibration", axis=1, action=0)[0] == "no_such_axis"
+    assert CompiledNode().request("calibration", axis=1, action=0)[0] == "no_such_axis"
 
 
 def test_axes_move_in_a_station_as_elsewhere(station):

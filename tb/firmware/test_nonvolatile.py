@@ -9,7 +9,7 @@ import zlib
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import PARAMETER, TABLE, Axis, FakeNode
+from twin.compiled.node import PARAMETER, TABLE, Axis, CompiledNode
 from twin.compiled.station import SETTING, Station
 
 COPIES = (8192, 12288)
@@ -355,7 +355,7 @@ def test_a_power_cut_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_on
 
 
 def test_the_axis_image_saves_nothing():
-    machine = FakeNode()
+    machine = CompiledNode()
     assert (
         machine.request("save_settings", action=0)[0]
         == machine.request("saved_settings")[0]

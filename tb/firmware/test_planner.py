@@ -161,6 +161,44 @@ def test_a_plan_taken_in_pieces_is_the_same_motion():
         )
 
 
+QUEUE, SHORT = 16, 2  # segments that the player queues; ticks that become one segment
+
+
+@pytest.mark.parametrize("rates", [S0, (125, *S0[1:]), "any", "trapezoid"])
+def test_ticks_that_are_joined_to_one_segment_are_the_same_motion(rates):
+    """Against the plan taken tick by tick. Only the last segment and one whose jerk does not fit
+    into 32 bits, which a trapezoid alone can have, are shorter than two ticks.
+    """
+    draw = random.Random(seed())
+    for _ in range(400):
+        made = random_rates(draw) if rates == "any" else S0 if rates == "trapezoid" else rates
+        inner = library().planner_limits(*made)
+        if rates == "trapezoid":
+            inner.jerk = 2**32 - 1
+        length = int(2 ** (draw.random() * 22)) * draw.choice((1, -1))
+        whole, ticked = Plan(), Plan()
+        if not library().planner_move(ctypes.byref(whole), ctypes.byref(inner), length):
+            continue
+        if whole.ticks > 3000:
+            continue
+        ctypes.pointer(ticked)[0] = whole
+        joined = segments_of(whole)
+        assert list(steps(joined)) == list(steps(taken(ticked, FOREVER, 1)))
+        if rates != "trapezoid":
+            assert all(segment[3] >= SHORT for segment in joined[:-1])
+
+
+def test_a_short_motion_is_queued_as_a_whole_before_it_starts():
+    """A motion of less than 8 ms never waits for the soft core; of a longer one, the full queue
+    lasts 8 ms.
+    """
+    for length in range(1, 1 << 17, 61):
+        ticks = [segment[3] for segment in plan_of(length)[0]]
+        assert len(ticks) <= QUEUE or all(
+            sum(ticks[n : n + QUEUE]) >= SHORT * QUEUE for n in range(len(ticks) - QUEUE)
+        ), length
+
+
 def test_a_move_of_days_is_refused():
     assert plan_of(1 << 47, (1, 1, 1)) is None
 

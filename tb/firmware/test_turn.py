@@ -8,8 +8,8 @@ import random
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import CAUSE, FAULT, TABLE, Axis, FakeNode
-from twin.compiled.peripherals import TURN_ARCSEC, FakePeripherals, Sensor, Table
+from twin.compiled.node import CAUSE, FAULT, TABLE, Axis, CompiledNode
+from twin.compiled.peripherals import TURN_ARCSEC, PeripheralParts, Sensor, Table
 
 PHASE = {code: name for name, (code, _) in TABLE["turn_phase"].items()}
 SETTING = TABLE["setting"]
@@ -25,12 +25,12 @@ AXIS = {
 }
 
 
-class Station(FakeNode):
+class Station(CompiledNode):
     def __init__(self, angle=0.0, sensor=None, parameters=None, **table):
         self.random = random.Random(seed())
         self.table = Table(self.random, angle=angle, **table)
         self.sensor = Sensor(self.random, self.table, **(sensor or {}))
-        super().__init__(Axis(), image="station", peripherals=FakePeripherals(self.sensor))
+        super().__init__(Axis(), image="station", peripherals=PeripheralParts(self.sensor))
         self.set(**{**AXIS, **(parameters or {})})
         self.run(50)
 
@@ -284,7 +284,7 @@ def test_an_angle_beyond_a_turn_is_refused(hundredths):
 
 
 def test_a_node_without_a_sensor_reports_that():
-    machine = FakeNode(image="station")
+    machine = CompiledNode(image="station")
     assert (
         machine.request("turn_to", angle=0)[0] == "not_built"
         and machine.request("sensor")[0] == "not_built"

@@ -103,7 +103,6 @@ def test_a_cell_is_the_first_sentence_without_its_details(text, short):
 STAND_ALONE = {  # instantiated by no other module, and the reason why they exist
     "node": "a product",
     "relay": "a product",
-    "motion_engine": "to replace the blocks of each axis that move it; no node has it yet",
     "encoder_counter": "a product: a counter on the bus of another design",
     "arctan_iterative": "the small alternative to arctan_pipelined",
     "arctan_table": "the method of S0",

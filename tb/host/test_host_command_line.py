@@ -21,15 +21,17 @@ from moire.bus.twin_port import MACHINES
 from moire.cli import command_line, completion, shell
 from moire.errors import PortError
 from moire.made.bus_tables import PARAMETERS
-from tb.fakes.fake_node import CAUSE, ESTOP, FakeBus, FakeNode
+from tb.fakes.bus_node import START, BusNode
+from tb.fakes.rs485_bus import Rs485Bus
 from twin import BuildError
+from twin.compiled.node import DEFINES, FAULT, PERIOD, Axis
 
 
 class Call:
-    """One call of `moire` against a fake bus."""
+    """One call of `moire` against nodes on a bus."""
 
     def __init__(self, text, *nodes, bus=None):
-        self.bus = bus or FakeBus(*(nodes or [FakeNode()]))
+        self.bus = bus or Rs485Bus(*(nodes or [BusNode()]))
         self.options, out, err = None, io.StringIO(), io.StringIO()
 
         def open_transport(options):
@@ -57,7 +59,7 @@ def sentence(call, code):
 
 
 def test_home_move_status_in_one_call_and_the_drive_is_off_at_its_end():
-    node = FakeNode()
+    node = BusNode()
     call = Call("home -- move 1mm -- move -200um --by -- status", node)
     assert call.code == 0 and call.err == ""
     assert "at 1.000000 mm, error 0.0 nm" in call.out
@@ -66,20 +68,20 @@ def test_home_move_status_in_one_call_and_the_drive_is_off_at_its_end():
 
 
 def test_a_drive_that_was_on_before_is_left_to_its_owner():
-    node = FakeNode()
-    node.axes[0].enabled = node.axes[0].homed = True
+    node = BusNode()
+    node.home(on=True)
     assert Call("status", node).code == 0 and node.axes[0].enabled
     assert Call("disable", node).code == 0 and not node.axes[0].enabled
 
 
 def test_drives_are_switched_off_after_an_error_too():
-    node = FakeNode()
+    node = BusNode()
     assert Call("enable -- move 1mm", node).code == 1
     assert not node.axes[0].enabled
 
 
 def test_options_of_the_first_command_hold_for_all_and_may_be_given_again():
-    nodes = FakeNode(1), FakeNode(2, axes=2)
+    nodes = BusNode(1), BusNode(2, axes=2)
     call = Call(
         "--address 2 home --axis 1 -- status -- status --axis 0 "
         "-- status --address 1 --axis 0 --json",
@@ -91,11 +93,11 @@ def test_options_of_the_first_command_hold_for_all_and_may_be_given_again():
         (2, 0),
         (1, 0),
     ]
-    assert nodes[1].axes[1].homed and not nodes[1].axes[0].homed
+    assert nodes[1].homed(1) and not nodes[1].homed(0)
 
 
 def test_find_lists_the_nodes_and_marks_those_of_another_build():
-    call = Call("find 1 3", FakeNode(1), FakeNode(3, map_crc=1, axes=2))
+    call = Call("find 1 3", BusNode(1), BusNode(3, map_crc=1, axes=2))
     assert call.code == 0
     assert call.out.splitlines()[0].startswith(
         "node 1: 1 axis, clock 4 MHz, servo 4 kHz, samples 100 kHz, made from the same sources"
@@ -103,33 +105,38 @@ def test_find_lists_the_nodes_and_marks_those_of_another_build():
     assert "node 3: 2 axes" in call.out and "MADE FROM OTHER SOURCES" in call.out
     assert [
         node["matches"]
-        for node in Call("find --json", FakeNode(1), FakeNode(3, map_crc=1)).results[0]["nodes"]
+        for node in Call("find --json", BusNode(1), BusNode(3, map_crc=1)).results[0]["nodes"]
     ] == [True, False]
 
 
 def test_find_tries_the_usual_baud_rates_and_reports_the_one_found():
-    node = FakeNode(2)
-    node.baud = 1_000_000
+    node = BusNode(2)
+    node.use_baud(500_000)
     assert "or try all with 'find --any-baud'" in sentence(Call("find", node), 3)
+    node = BusNode(2)  # the other one has returned to its first rate, since nobody called it
+    node.use_baud(500_000)
     call = Call("find --any-baud -- status --address 2", node)
     assert (
-        call.code == 0 and "at 1000000 baud: --baud 1000000" in call.out and "drive off" in call.out
+        call.code == 0 and "at 500000 baud: --baud 500000" in call.out and "drive off" in call.out
     )
-    assert Call("find --any-baud --json", node).results[0]["baud"] == 1_000_000
+    node.use_baud(500_000)
+    assert Call("find --any-baud --json", node).results[0]["baud"] == 500_000
     assert "check power and wiring; no usual baud rate is left" in sentence(
         Call("find 5 --any-baud", node), 3
     )
 
 
 def test_enable_wait_stop_reset_encoder_counters():
-    call = Call("enable -- wait 0.5s -- stop -- disable -- reset -- encoder -- counters")
+    node = BusNode()
+    node.home()
+    call = Call("enable -- wait 0.5s -- stop -- disable -- reset -- encoder -- counters", node)
     assert call.code == 0 and call.bus.clock > 0.5
     assert "drive on" in call.out and "no fault is latched" in call.out
-    assert "margin 50 %" in call.out and "frames_good" in call.out and "no_answer" in call.out
+    assert "margin 77 %" in call.out and "frames_good" in call.out and "no_answer" in call.out
 
 
 def test_a_node_without_sine_and_cosine_reports_it():
-    node = FakeNode(absent=("sine", "monitor", "harmonics", "recorder"))
+    node = BusNode(absent=("sine", "monitor", "harmonics", "recorder"))
     call = Call("status -- encoder", node)
     assert (
         call.out.count("counts only: built without sine and cosine") == 2
@@ -146,7 +153,7 @@ def test_a_node_without_sine_and_cosine_reports_it():
 
 
 def test_what_an_axis_was_built_with_is_listed_with_its_parameters():
-    node = FakeNode(absent=("compare", "fine_stage"))
+    node = BusNode(absent=("compare", "fine_stage", "segments"))
     rows = dict(row.split(None, 1) for row in Call("built", node).out.splitlines()[1:])
     assert rows["HAS_COMPARE"] == rows["HAS_FINE_STAGE"] == rows["SEGMENTS"] == "not built"
     assert rows["HAS_STEPPER"] == "built" and rows["FILTERS"] == "up to 2"
@@ -166,69 +173,83 @@ def test_what_an_axis_was_built_with_is_listed_with_its_parameters():
     ],
 )
 def test_a_refusal_names_the_parameter_that_builds_what_is_missing(command, parameter):
-    node = FakeNode(absent=("drive", "stepper", "fine_stage", "compare"))
+    node = BusNode(absent=("drive", "stepper", "fine_stage", "compare"))
     assert f"(it needs {parameter} of rtl/node.sv)" in sentence(Call(command, node), 1)
 
 
 def test_registers_by_address_and_by_name():
-    node = FakeNode()
-    node.registers = {0x110: 258, 0x400: 5}
-    call = Call("register 0x110 272 bus.frames_good axis.control", node)
+    node = BusNode()
+    node.port.count("START_GLITCHES", 258)
+    address = DEFINES["BUS_BASE"] + DEFINES["BUS_START_GLITCHES"]
+    call = Call(f"register {address:#x} {address} bus.start_glitches axis.control", node)
     assert call.code == 0
     assert (
-        "0x110 = 0x00000102 258\n272 = 0x00000102 258\n"
-        "bus.frames_good: value = 258\naxis.control: enable = 1" in call.out
+        f"{address:#x} = 0x00000102 258\n{address} = 0x00000102 258\n"
+        "bus.start_glitches: value = 258\naxis.control: enable = 0" in call.out
     )
     assert "axis.position" in Call("register").out
-    assert Call("register 0x110 --json", node).results[0]["registers"] == {"0x110": 258}
+    assert Call(f"register {address:#x} --json", node).results[0]["registers"] == {
+        f"{address:#x}": 258
+    }
 
 
 def test_parameters_are_listed_set_and_read_back():
-    node = FakeNode()
+    node = BusNode()
     call = Call("params set velocity 5mm/s -- params get velocity kp -- params list", node)
-    assert call.code == 0 and node.axes[0].parameters[PARAMETERS["velocity"].id] == 6250
+    assert call.code == 0 and node.parameter("velocity") == 6250
     rows = call.out.splitlines()
     assert rows[0].split()[:2] == ["velocity", "5mm/s"] and "800nm/s to 800mm/s" in rows[0]
     assert len(rows) == 1 + 2 + len(PARAMETERS)
     assert (
         Call("params set travel_low -1.5mm", node).code == 0
-        and node.axes[0].parameters[3] == -1875 * 65536
+        and node.parameter("travel_low") == -1875 * 65536
     )
     assert Call("params get period --json", node).results[0]["parameters"][0]["value"] == 800
 
 
 def test_parameters_are_saved_and_loaded(tmp_path):
-    node, file = FakeNode(), str(tmp_path / "stage.json")
-    node.axes[0].parameters[PARAMETERS["settle_window"].id] = 1639
+    node, file = BusNode(), str(tmp_path / "stage.json")
+    node.set(settle_window=1639)
     assert (
         Call(["params", "save", file], node).out
         == f"{len(PARAMETERS)} parameters saved in {file}\n"
     )
     assert json.loads(open(file).read())["parameters"]["acceleration"] == "100mm/s2"
-    other = FakeNode()
+    other = BusNode()
     assert (
-        Call(["params", "load", file], other).code == 0
-        and other.axes[0].parameters == node.axes[0].parameters
+        Call(["params", "load", file], other).code == 0 and other.parameters() == node.parameters()
     )
 
 
 def test_two_axes_begin_together():
-    node = FakeNode(axes=2)
+    node = BusNode(axes=2)
     call = Call("home -- home --axis 1 -- prepare 1mm -- prepare 2mm --axis 1 -- start 0 1", node)
     assert call.code == 0, call.err
     assert (
         "node 1 axis 0: at 1.000000 mm, error 0.0 nm\nnode 1 axis 1: at 2.000000 mm, error 0.0 nm"
         in call.out
     )
-    assert sentence(Call("home -- prepare 1mm -- start 0 1", FakeNode(axes=2)), 1).endswith(
+    assert sentence(Call("home -- prepare 1mm -- start 0 1", BusNode(axes=2)), 1).endswith(
         "the axis has no motion prepared\n"
     )
 
 
-def test_a_motion_is_slowed_paused_resumed_and_awaited():
-    node = FakeNode()
+def test_the_drives_of_several_nodes_stay_on_while_one_of_them_moves():
+    nodes = BusNode(1), BusNode(2)
     call = Call(
-        "home -- override 50% -- move 1mm --no-wait -- pause -- wait 20s "
+        "home -- home --address 2 -- move 10mm -- watch --address 2 --for 1s -- prepare 1mm "
+        "-- prepare 1mm --address 2 -- start 1.0 2.0",
+        *nodes,
+    )
+    assert call.code == 0, call.err
+    assert call.bus.clock > 4 and [node.axes[0].faults for node in nodes] == [0, 0]
+    assert call.out.count("at 1.000000 mm") == 2
+
+
+def test_a_motion_is_slowed_paused_resumed_and_awaited():
+    node = BusNode()
+    call = Call(
+        "home -- override 50% -- move 1mm --no-wait -- pause -- wait 2s "
         "-- resume -- finish -- override",
         node,
     )
@@ -239,28 +260,25 @@ def test_a_motion_is_slowed_paused_resumed_and_awaited():
         and "on its way" in rows[2]
         and rows[3].endswith("paused")
     )
-    assert (
-        "moving" in rows[4]
-        and any("at 1.000000 mm, error 0.0 nm" in row for row in rows)
-        and rows[-1].endswith("50 % of full speed")
-    )
+    assert "moving" in rows[4] and any("at 1.000000 mm, error 0.0 nm" in row for row in rows)
+    assert rows[-1].endswith("50 % of full speed")
+    overrides = [
+        fields["value"]
+        for fields in node.written("set_parameter")
+        if fields["parameter"] == PARAMETERS["feed_override"].id
+    ]
+    assert overrides == [1 << 15, 0, 1 << 15]
 
 
 def test_home_takes_a_method():
-    node = FakeNode()
-    assert (
-        Call("home --method 35", node).code == 0
-        and node.axes[0].parameters[PARAMETERS["home_method"].id] == 35
-    )
-    assert (
-        Call("home --method s3", node).code == 0
-        and node.axes[0].parameters[PARAMETERS["home_method"].id] == -2
-    )
+    node = BusNode(axes=[Axis(START, index=[START + PERIOD])])
+    assert Call("home --method 35", node).code == 0 and node.parameter("home_method") == 35
+    assert Call("home --method s3", node).code == 0 and node.parameter("home_method") == -2
 
 
 def test_the_drive_and_choices_in_words():
-    node = FakeNode(absent=("fine_stage",))
-    node.registers.update({0x1400: 1, 0x1420: 25, 0x143C: 0})
+    node = BusNode(absent=("fine_stage",))
+    node.set_actuator(DRIVE=1, STEPS=25)
     call = Call("drive -- params set drive steps -- register actuator.steps", node)
     assert call.code == 0, call.err
     assert (
@@ -268,14 +286,14 @@ def test_the_drive_and_choices_in_words():
         and "25 on the wire" in call.out
         and "fine" not in call.out
     )
-    assert "bridge, steps, dac" in call.out and node.axes[0].parameters[PARAMETERS["drive"].id] == 1
+    assert "bridge, steps, dac" in call.out and node.parameter("drive") == 1
     assert "'sideways': allowed are bridge, steps, dac" in sentence(
         Call("params set drive sideways", node), 2
     )
 
 
 def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
-    node, record, picture = FakeNode(), tmp_path / "record.csv", tmp_path / "tuning.png"
+    node, record, picture = BusNode(), tmp_path / "record.csv", tmp_path / "tuning.png"
     position = velocity = 0.0
     rows = ["command,position"]
     for command in tune.excitation(1000, 8000):
@@ -293,10 +311,10 @@ def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
         and not result["written"]
         and picture.read_bytes().startswith(b"\x89PNG")
     )
-    assert node.axes[0].writes == []
+    assert "set_parameter" not in node.executed
     call = Call(["tune", str(record), "--bandwidth", "40Hz", "--tick", "250us", "--write"], node)
     assert call.code == 0 and "written to node 1 axis 0" in call.out
-    assert node.axes[0].parameters[PARAMETERS["kp"].id] == round(result["gains"]["kp"] * 65536) > 0
+    assert node.parameter("kp") == round(result["gains"]["kp"] * 65536) > 0
 
 
 @pytest.mark.parametrize(
@@ -348,27 +366,27 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, text, message):
     ],
 )
 def test_every_command_prints_one_json_object_per_line(text):
-    node = FakeNode()
-    node.axes[0].enabled = True
     for arguments in (text + " --json", "--json " + text):
+        node = BusNode()
+        node.ask("enable", axis=0, on=1)
         call = Call(arguments, node)
         assert call.code == 0 and call.err == ""
         assert [result["command"] for result in call.results] == [
             part.split()[0] for part in text.split(" -- ")
         ]
-        node.axes[0].enabled = True
 
 
 def test_status_in_json_has_numbers_and_words():
-    node = FakeNode()
-    node.axes[0].active_faults = node.axes[0].faults = ESTOP
+    node = BusNode()
+    node.axes[0].causes = FAULT["estop"]
+    node.run(1)
     result = Call("status --json", node).results[0]
     assert (
         result["faults"] == ["estop"]
         and result["fault_words"] == "emergency stop"
         and result["state"] == "faulted"
     )
-    assert result["position_nm"] == pytest.approx(123456 / 65536 * 800) and result["homed"] is False
+    assert result["position_nm"] == pytest.approx(START / 65536 * 800) and result["homed"] is False
 
 
 def test_errors_are_json_too():
@@ -412,8 +430,8 @@ def test_a_usage_error_names_its_command(text, command):
 
 
 def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
-    node = FakeNode(absent=("fine_stage",))
-    node.registers.update({0x1400: 1, 0x1420: 25, 0x143C: 0})
+    node = BusNode(absent=("fine_stage",))
+    node.set_actuator(DRIVE=1, STEPS=25)
     result = Call("drive --json", node).results[0]
     assert result["command"] == "drive" and result["drive_command"] == 0 and result["steps"] == 25
 
@@ -467,14 +485,13 @@ def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
     ],
 )
 def test_wrong_usage_is_one_sentence_and_exit_code_2(text, message):
-    node = FakeNode()
-    node.registers = {}
+    node = BusNode()
     assert message in sentence(Call(text, node), 2)
     assert "set_parameter" not in node.executed
 
 
 def test_nothing_moves_when_a_later_command_is_wrong():
-    node = FakeNode()
+    node = BusNode()
     sentence(Call("home -- move 1mm -- move 2", node), 2)
     assert node.executed == []
 
@@ -492,26 +509,25 @@ def sentence_of_last(text, code):
 
 
 def test_a_motion_that_ends_badly_is_exit_code_1():
-    node = FakeNode()
-    node.axes[0].end_cause = "no_switch"
+    node = BusNode()
+    node.axes[0].low_at = None  # there is no switch
+    node.set(travel_low=0, travel_high=0)
     assert "no limit switch was found within the travel" in sentence(Call("home", node), 1)
     result = Call("home --json", node).results[-1]
-    assert (result["error"], result["cause"]) == ("MotionFailed", "no_switch") and CAUSE[
-        "no_switch"
-    ] == 15
+    assert (result["error"], result["cause"]) == ("MotionFailed", "no_switch")
 
 
 def test_silence_and_noise_are_exit_code_3():
     assert "nobody answers at address 5, asked 5 times" in sentence(Call("status --address 5"), 3)
     assert "nobody answers at the addresses 3, 4" in sentence(Call("find 3 4"), 3)
-    bus = FakeBus(FakeNode())
-    bus.from_node = lambda word: [word ^ 1]
+    bus = Rs485Bus(BusNode())
+    bus.from_nodes = lambda word: [word ^ 1]
     assert "garbled" in sentence(Call("status", bus=bus), 3)
 
 
 def test_two_nodes_with_one_address_are_exit_code_3():
-    bus = FakeBus(FakeNode(), FakeNode())
-    bus.wired_and, bus.nodes[1].powered_up = True, 0.3
+    bus = Rs485Bus(BusNode(), BusNode())
+    bus.nodes[1].clk += 1_200_000  # it was powered up 0.3 s before the other
     assert "two nodes with the address 1" in sentence(Call("find", bus=bus), 3)
 
 
@@ -564,49 +580,40 @@ def test_a_simulated_machine_that_does_not_exist_is_named():
 
 
 def test_another_build_is_exit_code_5():
-    assert "0000BEEF in the node" in sentence(Call("status", FakeNode(map_crc=0xBEEF)), 5)
+    assert "0000BEEF in the node" in sentence(Call("status", BusNode(map_crc=0xBEEF)), 5)
 
 
 def test_ctrl_c_stops_the_axis_and_is_exit_code_130():
-    node = FakeNode()
-    bus = FakeBus(node)
+    node = BusNode()
+    bus = Rs485Bus(node)
 
     def interrupt():
         raise KeyboardInterrupt
 
-    bus.at.append((0.5, interrupt))
+    bus.at.append((0.2, interrupt))
     call = Call("home", bus=bus)
     assert "interrupted; what moved was stopped under control" in sentence(call, 130)
-    assert node.axes[0].ended == "stopped"
-    assert (
-        "stop" in node.executed
-        and node.axes[0].kind is None
-        and not node.axes[0].enabled
-        and bus.closed
-    )
+    assert node.ended() == "stopped"
+    assert "stop" in node.executed and not node.axes[0].enabled and bus.closed
 
 
 def test_ctrl_c_in_another_command_stops_what_moves_too():
-    node = FakeNode()
-    node.axes[0].homed = True
-    bus = FakeBus(node)
+    node = BusNode()
+    node.home()
+    bus = Rs485Bus(node)
 
     def interrupt():
         raise KeyboardInterrupt
 
     bus.at.append((0.5, interrupt))
     assert Call("move 100mm --no-wait -- watch --json", bus=bus).results[-1]["exit_code"] == 130
-    assert (
-        node.executed[-1] == "enable"
-        and "stop" in node.executed
-        and node.axes[0].ended == "stopped"
-    )
-    assert node.axes[0].target != 100_000_000 * 65536 // 800
+    assert node.executed[-1] == "enable" and "stop" in node.executed and node.ended() == "stopped"
+    assert node.axes[0].position < 10_000_000 * 65536 // 800
 
 
 def test_an_output_that_nobody_reads_any_more_stops_the_axis():
-    node = FakeNode()
-    node.axes[0].homed = True
+    node = BusNode()
+    node.home()
     reader, writer = os.pipe()
     os.close(reader)
     with pytest.raises(BrokenPipeError), os.fdopen(writer, "w") as out:
@@ -616,19 +623,19 @@ def test_an_output_that_nobody_reads_any_more_stops_the_axis():
     os.close(reader)
     err, out = io.StringIO(), os.fdopen(writer, "w")
     arguments = ["move", "100mm", "--no-wait"]
-    bus = FakeBus(node)
+    bus = Rs485Bus(node)
     assert command_line.main(arguments, lambda _: bus, out, err) == 0 and err.getvalue() == ""
-    assert "stop" in node.executed and node.axes[0].ended == "stopped" and bus.closed
+    assert "stop" in node.executed and node.ended() == "stopped" and bus.closed
 
 
 def test_a_full_disk_is_one_sentence_and_stops_the_axis():
-    node, err = FakeNode(), io.StringIO()
-    node.axes[0].homed = True
+    node, err = BusNode(), io.StringIO()
+    node.home()
     for more in ([], ["--json"]):
         with open("/dev/full", "w") as out:
             arguments = ["move", "100mm", "--no-wait", *more]
-            assert command_line.main(arguments, lambda _: FakeBus(node), out, err) == 2
-        assert node.axes[0].ended == "stopped" and not node.axes[0].enabled
+            assert command_line.main(arguments, lambda _: Rs485Bus(node), out, err) == 2
+        assert node.ended() == "stopped" and not node.axes[0].enabled
     sentence = "moire: the output cannot be written: No space left on device\n"
     assert err.getvalue() == 2 * sentence
 
@@ -704,7 +711,7 @@ def test_bash_completes_the_last_command_of_a_chain(typed, offered):
 
 
 def test_a_file_of_commands_is_carried_out(tmp_path):
-    node, file = FakeNode(), tmp_path / "warm up.txt"
+    node, file = BusNode(), tmp_path / "warm up.txt"
     file.write_text("# to the zero\nhome\n\nmove 1mm   # there\nmove -0.5mm --by -- status\n")
     call = Call(["run", str(file), "--json"], node)
     assert call.code == 0 and [result["command"] for result in call.results] == [
@@ -726,7 +733,7 @@ def test_a_file_of_commands_is_carried_out(tmp_path):
     ],
 )
 def test_a_file_with_a_wrong_line_moves_nothing(tmp_path, text, message):
-    node, file = FakeNode(), tmp_path / "wrong.txt"
+    node, file = BusNode(), tmp_path / "wrong.txt"
     file.write_text(text)
     assert message in sentence(Call(["run", str(file)], node), 2)
     assert node.executed == []
@@ -736,14 +743,14 @@ def test_a_file_with_a_wrong_line_moves_nothing(tmp_path, text, message):
     "text", ["{", '"x"', "{}", '{"parameters": {"kp": 1}}', '{"parameters": []}']
 )
 def test_a_file_without_parameters_is_refused(tmp_path, text):
-    node, file = FakeNode(), tmp_path / "wrong.json"
+    node, file = BusNode(), tmp_path / "wrong.json"
     file.write_text(text)
     sentence(Call(["params", "load", str(file)], node), 2)
     assert "set_parameter" not in node.executed
 
 
 def test_the_shell_keeps_the_drive_on_between_commands(monkeypatch):
-    node = FakeNode()
+    node = BusNode()
     monkeypatch.setattr(sys, "stdin", io.StringIO("home\nmove 1mm\nstatus\nquit\nfly\n"))
     call = Call("shell", node)
     assert call.code == 0 and "holding position, zero known" in call.out
@@ -763,7 +770,7 @@ def test_json_may_be_selected_for_a_single_line(monkeypatch):
 
 
 def test_commands_from_a_pipe_end_at_the_first_error(monkeypatch):
-    node = FakeNode()
+    node = BusNode()
     monkeypatch.setattr(sys, "stdin", io.StringIO("home\nfly\nmove 1mm\n"))
     assert "'fly'" in sentence(Call("shell", node), 2)
     assert "move" not in node.executed
@@ -778,10 +785,10 @@ def test_ctrl_c_in_the_shell_stops_what_moves(monkeypatch):
             yield from ("home\n", "move 100mm --no-wait\n")
             raise KeyboardInterrupt
 
-    node = FakeNode()
+    node = BusNode()
     monkeypatch.setattr(sys, "stdin", Keyboard())
     call = Call("shell", node)
-    assert call.code == 0 and "stopped" in call.err and node.axes[0].ended == "stopped"
+    assert call.code == 0 and "stopped" in call.err and node.ended() == "stopped"
 
 
 def test_the_shell_has_help(monkeypatch, capsys):
@@ -794,8 +801,9 @@ def test_the_shell_has_help(monkeypatch, capsys):
 SHELL_AT_A_TERMINAL = """
 import sys
 from moire.cli import command_line
-from tb.fakes.fake_node import FakeBus, FakeNode
-sys.exit(command_line.main(["shell"], lambda _: FakeBus(FakeNode())))
+from tb.fakes.bus_node import BusNode
+from tb.fakes.rs485_bus import Rs485Bus
+sys.exit(command_line.main(["shell"], lambda _: Rs485Bus(BusNode())))
 """
 
 
@@ -857,7 +865,7 @@ def test_a_shell_ends_when_its_node_no_longer_answers(monkeypatch):
                 threading.Event().wait(0.01)
                 yield "\n"
 
-    bus = FakeBus(FakeNode())
+    bus = Rs485Bus(BusNode())
     bus.time_is_stopped = False
     monkeypatch.setattr(sys, "stdin", Keyboard())
     monkeypatch.setattr(shell, "KEEP_ALIVE_S", 0.001)
@@ -869,7 +877,7 @@ def test_a_person_may_mistype_in_the_shell(monkeypatch):
         def isatty(self):
             return True
 
-    node = FakeNode()
+    node = BusNode()
     monkeypatch.setattr(sys, "stdin", Keyboard("fly\nmove --help\nhome\nmove 1\nmove 1mm\n"))
     call = Call("shell", node)
     assert call.code == 0 and node.axes[0].position == 1250 * 65536
@@ -891,8 +899,8 @@ def test_a_waiting_shell_sends_requests_on_a_bus_in_real_time(monkeypatch):
                 threading.Event().wait(0.01)
             yield "quit\n"
 
-    node = FakeNode()
-    bus = FakeBus(node)
+    node = BusNode()
+    bus = Rs485Bus(node)
     bus.time_is_stopped = False
     monkeypatch.setattr(sys, "stdin", Keyboard())
     monkeypatch.setattr(shell, "KEEP_ALIVE_S", 0.01)

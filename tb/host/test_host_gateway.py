@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""moire.bus.gateway and its clients: pyserial and our own transports, against nodes in Python
-behind real sockets and pseudo terminals.
+"""moire.bus.gateway and its clients: pyserial and our own transports, against the
+compiled firmware behind real sockets and pseudo terminals.
 """
 
 import contextlib
@@ -23,8 +23,10 @@ from moire.bus.transport import CobsBus, SerialBus, open_bus
 from moire.cli import command_line
 from moire.client.bus import Bus
 from moire.errors import BusGarbled, MoireError, NoAnswer, PortError
+from moire.made.registers import MAP_CRC
 from tb.bench import seed
-from tb.fakes.fake_node import FakeBus, FakeNode
+from tb.fakes.bus_node import START, BusNode
+from tb.fakes.rs485_bus import Rs485Bus
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
@@ -37,7 +39,7 @@ class Served:
     """A gateway in a thread, with all three entrances open."""
 
     def __init__(self, *nodes):
-        self.far = FakeBus(*(nodes or [FakeNode()]))
+        self.far = Rs485Bus(*(nodes or [BusNode()]))
         self.gateway = Gateway(self.far)
         host = "127.0.0.1"
         self.ports = {
@@ -99,7 +101,7 @@ def test_the_same_work_is_done_through_every_entrance(served, entrance, parity):
     assert (
         node.executed.count("enable") == 1
         and node.axes[0].enabled
-        and node.axes[0].parameters[5] == 8750
+        and node.parameter("velocity") == 8750
     )
     assert node.counters["frames_bad"] == 0
 
@@ -114,7 +116,7 @@ def test_auto_uses_nine_bits_over_rfc2217_and_packets_elsewhere(served):
 
 def test_every_byte_arrives_with_the_ninth_bit_it_was_sent_with(served):
     words = []
-    served.far.to_node = lambda word: words.append(word) or []
+    served.far.to_nodes = lambda word: words.append(word) or []
     source = random.Random(SEED)
     sent = [source.randrange(512) for _ in range(60)] + [0xFF, 0x1FF, 0xF0, 0x1FA]
     with opened(served, "rfc2217", "mark") as port:
@@ -149,11 +151,11 @@ def test_the_stock_client_alone_reads_a_position_in_8n1(served):
         assert (
             contents[0][0] == 0x51
             and body[:3] == bytes([9, 2, 0])
-            and int.from_bytes(body[11:19], "little") == 123456
+            and int.from_bytes(body[11:19], "little") == START
         )
 
 
-@pytest.mark.parametrize("served", [(FakeNode(1), FakeNode(6), FakeNode(15))], indirect=True)
+@pytest.mark.parametrize("served", [(BusNode(1), BusNode(6), BusNode(15))], indirect=True)
 def test_find_sees_all_nodes_through_packets(served):
     with opened(served, "tcp") as port:
         assert [node.address for node in Bus(port).find([1, 2, 6, 15])] == [1, 6, 15]
@@ -199,27 +201,27 @@ def test_a_reply_that_comes_too_late_is_not_taken_for_the_next(served):
         bus = Bus(port)
         bus.node()
         port.port.write(cobs.packet(0x21, request_body("counters", 200)))
-        assert bus.request(1, "read_register", address=0x400) == {"value": 7}
-        assert bus.request(1, "read_register", address=0x400) == {"value": 7}
+        assert bus.request(1, "read_register", address=0) == {"value": MAP_CRC}
+        assert bus.request(1, "read_register", address=0) == {"value": MAP_CRC}
 
 
 def test_a_slow_answer_is_awaited_without_a_request_of_another_client_in_between():
-    far = FakeBus(FakeNode())
+    far = Rs485Bus(BusNode())
     gateway, node = Gateway(far), far.nodes[0]
     assert gateway.answer(1, request_body("identify", 1))
     ready_at = far.now() + 0.125  # the node is planning; its hardware acknowledges requests
-    far.from_node = lambda word: [word] if word == 0x61 or far.now() >= ready_at else []
+    far.from_nodes = lambda word: [word] if word == 0x61 or far.now() >= ready_at else []
     assert gateway.answer(1, request_body("enable", 2, axis=0, on=1))
     assert node.executed == ["identify", "enable"] and node.counters["repeated"] >= 1
     gateway.close()
 
 
 def test_a_node_that_is_absent_delays_the_others_by_one_attempt_only():
-    far = FakeBus(FakeNode())
+    far = Rs485Bus(BusNode())
     gateway = Gateway(far)
     assert gateway.answer(9, request_body("identify", 1)) == b"" and far.now() < 0.1
     assert gateway.answer(1, request_body("identify", 1))
-    far.from_node = lambda word: []
+    far.from_nodes = lambda word: []
     assert gateway.answer(1, request_body("identify", 2)) == b""
     absent_at = far.now()
     assert gateway.answer(1, request_body("identify", 3)) == b"" and far.now() < absent_at + 0.1
@@ -268,7 +270,7 @@ def test_a_tcp_port_in_use_is_one_sentence():
             PortError,
             match=f"the TCP port {number} at 127.0.0.1 does not open: .*already in use; choose",
         ):
-            Gateway(FakeBus(FakeNode())).open_tcp("127.0.0.1", number)
+            Gateway(Rs485Bus(BusNode())).open_tcp("127.0.0.1", number)
 
 
 def test_a_pseudo_terminal_in_use_is_one_sentence(served):
@@ -295,7 +297,7 @@ def test_no_permission_is_one_sentence(tmp_path, monkeypatch):
 def test_a_port_unplugged_during_a_move_is_one_sentence_that_names_the_watchdog(entrance):
     served = Served()
     node = served.far.nodes[0]
-    node.axes[0].homed = True
+    node.home()
     threading.Thread(
         target=lambda: (served.wait_until(lambda: "move" in node.executed), served.end())
     ).start()
@@ -306,7 +308,7 @@ def test_a_port_unplugged_during_a_move_is_one_sentence_that_names_the_watchdog(
     )
 
 
-@pytest.mark.parametrize("served", [(FakeNode(1, map_crc=1),)], indirect=True)
+@pytest.mark.parametrize("served", [(BusNode(1, map_crc=1),)], indirect=True)
 def test_a_node_of_another_build_is_one_sentence(served):
     message = complaint(f"--port {served.ports['tcp']} status", 5)
     assert (
@@ -315,10 +317,9 @@ def test_a_node_of_another_build_is_one_sentence(served):
     )
 
 
-@pytest.mark.parametrize("served", [(FakeNode(1), FakeNode(1))], indirect=True)
+@pytest.mark.parametrize("served", [(BusNode(1), BusNode(1))], indirect=True)
 def test_two_nodes_with_one_address_are_one_sentence(served):
-    served.far.nodes[1].axes[0].position += 999
-    served.far.wired_and = True
+    served.far.nodes[1].axes[0].machine += 999
     with opened(served, "rfc2217", "mark") as port:
         with pytest.raises(
             BusGarbled, match="wrong CRC-32; as from noise, .* or two nodes with the address 1"
@@ -327,7 +328,7 @@ def test_two_nodes_with_one_address_are_one_sentence(served):
 
 
 def fake_twin(baud, machine, seed, nodes=(1, 2)):
-    bus = FakeBus(*map(FakeNode, nodes))
+    bus = Rs485Bus(*map(BusNode, nodes))
     bus.addresses = nodes
     return bus
 

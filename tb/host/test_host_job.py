@@ -12,8 +12,8 @@ from moire.cli import command_line
 from moire.client.bus import Bus
 from moire.client.job import Job, equal_parts, read_stations
 from moire.errors import BadFile, OutOfRange, Refused
-from tb.fakes.firmware_bus import FakeNodeBus
-from twin.compiled.station import OPERATION, Station, SubNode
+from tb.fakes.rs485_bus import Rs485Bus, port_of
+from twin.compiled.station import Station, SubNode
 
 ADDRESS = 2
 
@@ -23,14 +23,14 @@ class Workshop:
         self.station = Station(**{"absent": ("keypad", "display"), **options})
         self.station.sub_node = SubNode()
         self.station.setting(peer_mode=2)
-        self.job = Job(Bus(FakeNodeBus(self.station)).node(ADDRESS))
+        self.job = Job(Bus(Rs485Bus(self.station)).node(ADDRESS))
 
     def call(self, text):
         """Exit code, standard output and standard error of a command."""
         out, err = io.StringIO(), io.StringIO()
         code = command_line.main(
             ["--address", str(ADDRESS), *text.split()],
-            lambda options: FakeNodeBus(self.station),
+            lambda options: Rs485Bus(self.station),
             out,
             err,
         )
@@ -162,16 +162,12 @@ def test_a_question_is_printed_and_answered():
 
 
 def test_waiting_polls_the_table_too():
-    workshop, operations = Workshop(), []
+    workshop = Workshop()
+    port = port_of(workshop.station)
     workshop.call("job load --equal 2")
-    receive = workshop.station.receive
-    workshop.station.receive = lambda words: (
-        operations.append(words[2] if len(words) > 2 else None) or receive(words)
-    )
-    assert workshop.call("job start --wait")[0] == 0 and OPERATION["status"] not in operations
+    assert workshop.call("job start --wait")[0] == 0 and "status" not in port.executed
     assert (
-        workshop.call("job start --wait --table 2")[0] == 0
-        and operations.count(OPERATION["status"]) > 20
+        workshop.call("job start --wait --table 2")[0] == 0 and port.executed.count("status") > 20
     )
     code, _, errors = workshop.call("job wait --table 3")
     assert code == 3 and "address 3" in errors

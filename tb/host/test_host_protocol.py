@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """moire.bus.protocol: known bytes, every kind of failure of an exchange, and random noise against
-the node in fake_node.py.
+the compiled firmware.
 """
 
 import random
@@ -21,7 +21,8 @@ from moire.client.bus import Bus
 from moire.errors import BusError, BusGarbled, NoAnswer, OutOfRange
 from moire.made.bus_tables import LONGEST_BODY, OPERATIONS
 from tb.bench import seed
-from tb.fakes.fake_node import FakeBus, FakeNode, spoil
+from tb.fakes.bus_node import BusNode
+from tb.fakes.rs485_bus import Rs485Bus, spoil
 
 SEED = seed()
 ENABLE = request_body("enable", 7, axis=0, on=1)
@@ -186,32 +187,32 @@ def test_the_timeout_grows_with_the_number_of_expected_words():
 
 
 def test_a_request_with_any_word_lost_is_repeated_and_executed_once():
-    for to_node in (True, False):
+    for to_nodes in (True, False):
         for position in range(60):
-            node = FakeNode()
-            fake, seen = FakeBus(node), []
+            node = BusNode()
+            wire, seen = Rs485Bus(node), []
 
             def lose(word, position=position, seen=seen):
                 seen.append(word)
                 return [] if len(seen) == position + 1 else [word]
 
-            setattr(fake, "to_node" if to_node else "from_node", lose)
-            bus = Bus(fake, random_source=random.Random(1))
+            setattr(wire, "to_nodes" if to_nodes else "from_nodes", lose)
+            bus = Bus(wire, random_source=random.Random(1))
             bus.request(1, "enable", axis=0, on=1)
             bus.request(1, "set_parameter", axis=0, parameter=15, value=4)
             assert node.executed == ["enable", "set_parameter"], position
-            assert node.axes[0].writes == ["kp"]
+            assert node.written("set_parameter") == [dict(axis=0, parameter=15, value=4)]
             if position >= len(seen):
                 break
         assert position > 5
 
 
 def test_a_repeated_request_is_counted_by_node_and_host():
-    node = FakeNode()
-    fake = FakeBus(node)
+    node = BusNode()
+    wire = Rs485Bus(node)
     dropped = iter([True])
-    fake.from_node = lambda word: [] if word == 0x51 and next(dropped, False) else [word]
-    bus = Bus(fake)
+    wire.from_nodes = lambda word: [] if word == 0x51 and next(dropped, False) else [word]
+    bus = Bus(wire)
     bus.request(1, "enable", axis=0, on=1)
     assert node.counters["repeated"] == 1 and node.executed == ["enable"]
     assert bus.statistics.repeats == 1 and bus.statistics.garbled == 1
@@ -222,61 +223,58 @@ def test_any_noise_ends_in_the_correct_reply_or_in_a_bus_error():
     source = random.Random(SEED)
     done = failed = 0
     for _ in range(150):
-        node = FakeNode()
-        fake = FakeBus(node)
+        node = BusNode()
+        wire = Rs485Bus(node)
         share = source.choice([0.001, 0.01, 0.05, 0.3])
-        fake.to_node, fake.from_node = spoil(source, share), spoil(source, share)
-        bus = Bus(fake, random_source=source)
+        wire.to_nodes, wire.from_nodes = spoil(source, share), spoil(source, share)
+        bus = Bus(wire, random_source=source)
         for _ in range(8):
             value = source.randrange(0, 16777216)
-            before = len(node.axes[0].writes)
+            before = len(node.executed)
             try:
                 bus.request(1, "set_parameter", axis=0, parameter=15, value=value)
-                assert (
-                    node.axes[0].parameters[15] == value and len(node.axes[0].writes) == before + 1
-                )
+                assert node.parameter("kp") == value and len(node.executed) == before + 1
                 done += 1
             except BusError:
-                assert len(node.axes[0].writes) <= before + 1
+                assert len(node.executed) <= before + 1
                 failed += 1
         # after the noise the bus works again
-        fake.to_node = fake.from_node = lambda word: [word]
-        assert (
-            bus.request(1, "get_parameter", axis=0, parameter=15)["value"]
-            == node.axes[0].parameters[15]
+        wire.to_nodes = wire.from_nodes = lambda word: [word]
+        assert bus.request(1, "get_parameter", axis=0, parameter=15)["value"] == node.parameter(
+            "kp"
         )
     assert done > 300 and failed > 50
 
 
 def test_sequence_numbers_begin_at_random_and_wrap():
-    node = FakeNode()
-    bus = Bus(FakeBus(node), random_source=random.Random(SEED))
+    node = BusNode()
+    bus = Bus(Rs485Bus(node), random_source=random.Random(SEED))
     numbers = []
     for _ in range(300):
         bus.request(1, "enable", axis=0, on=0)
-        numbers.append(node.last[0])
+        numbers.append(node.reply()[0])
     assert all((b - a) % 256 == 1 for a, b in zip(numbers, numbers[1:])) and 0 in numbers
     assert node.counters["repeated"] == 0
     firsts = set()
     for number in range(20):
-        other = Bus(FakeBus(node), random_source=random.Random(number))
+        other = Bus(Rs485Bus(node), random_source=random.Random(number))
         other.request(1, "enable", axis=0, on=0)
-        firsts.add(node.last[0])
+        firsts.add(node.reply()[0])
     assert len(firsts) > 10
 
 
 def test_a_new_host_with_the_number_of_the_last_one_still_gets_fresh_answers():
-    node = FakeNode()
-    fake = FakeBus(node)
+    node = BusNode()
+    wire = Rs485Bus(node)
 
     class Always5(random.Random):
         def randrange(self, *_):
             return 5
 
-    axis = Bus(fake, random_source=Always5()).axis()
+    axis = Bus(wire, random_source=Always5()).axis()
     before = axis.status().position_nm
-    node.axes[0].position += 65536
+    node.axes[0].machine += 65536
     axis = Bus(
-        fake, random_source=Always5()
+        wire, random_source=Always5()
     ).axis()  # identify may be taken for a repetition, since its answer is the same
     assert axis.status().position_nm == pytest.approx(before + 800)

@@ -10,16 +10,18 @@ import pytest
 from moire.bus import recording
 from moire.client.bus import Bus
 from moire.errors import BadFile
-from moire.made.bus_tables import PARAMETERS
-from tb.fakes.fake_node import ESTOP, FakeBus, FakeNode
+from moire.made.registers import MAP_CRC
+from tb.fakes.bus_node import BusNode
+from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
+from twin.compiled.node import FAULT
 
 SINE = ("sine", "monitor", "harmonics", "recorder")  # what is built of sine and cosine
 
 
 def recorded(tmp_path, text="home -- move 1mm -- status", node=None):
     file = tmp_path / "session.jsonl"
-    assert Call(f"--record {file} {text}", node or FakeNode()).code == 0
+    assert Call(f"--record {file} {text}", node or BusNode()).code == 0
     return file
 
 
@@ -27,7 +29,7 @@ def recorded(tmp_path, text="home -- move 1mm -- status", node=None):
 
 
 def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
-    file, node = recorded(tmp_path), FakeNode()
+    file, node = recorded(tmp_path), BusNode()
     call = Call(f"replay {file}", node)
     assert call.code == 0 and call.out.endswith("the same, 0 with other values, 0 different\n")
     assert int(call.out.split()[0]) > 20
@@ -37,18 +39,18 @@ def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
 
 
 def test_other_values_are_distinguished_from_other_outcomes(tmp_path):
-    file, other, broken = recorded(tmp_path, "status"), FakeNode(), FakeNode()
-    other.axes[0].position += 1
+    file, other, broken = recorded(tmp_path, "status"), BusNode(), BusNode(map_crc=5)
+    other.axes[0].machine += 1
     reported = Call(f"replay {file} --json", other).results[0]
     assert (reported["same"], reported["other_values"], reported["different"]) == (7, 1, 0)
-    broken.wrong_map = True
+    broken.map_crc = MAP_CRC
     message = sentence(Call(f"replay {file}", broken), 1)
     assert "answers differ from the record: at 0." in message and "came instead of" in message
 
 
 def test_a_replay_to_a_silent_node_differs(tmp_path):
     assert "nothing came instead of 61" in sentence(
-        Call(f"replay {recorded(tmp_path, 'status')}", FakeNode(2)), 1
+        Call(f"replay {recorded(tmp_path, 'status')}", BusNode(2)), 1
     )
 
 
@@ -64,9 +66,9 @@ def test_a_record_is_shown_in_words_without_a_port(tmp_path):
 
 
 def test_errors_on_the_bus_are_in_the_record(tmp_path):
-    bus = FakeBus(FakeNode())
+    bus = Rs485Bus(BusNode())
     broken = [True]
-    bus.from_node = lambda word: [word ^ broken.pop()] if broken else [word]
+    bus.from_nodes = lambda word: [word ^ broken.pop()] if broken else [word]
     with open(tmp_path / "bad.jsonl", "w") as file:
         Bus(recording.Recorder(bus, file)).identify(1)
     rows = recording.listing(recording.read((tmp_path / "bad.jsonl").read_text()))
@@ -74,7 +76,7 @@ def test_errors_on_the_bus_are_in_the_record(tmp_path):
 
 
 def test_a_recorder_hides_nothing_of_its_transport():
-    class Deep(FakeBus):
+    class Deep(Rs485Bus):
         handshake, character_s = False, 0.125
 
         def reaches(self, address):
@@ -100,29 +102,29 @@ def test_a_recorder_hides_nothing_of_its_transport():
 
 
 def test_a_change_of_the_baud_rate_and_the_break_after_it_are_recorded_and_replayed(tmp_path):
-    file = recorded(tmp_path, "baud 1000000 1 -- home -- status")
+    file = recorded(tmp_path, "baud 500000 1 -- home -- status")
     events = [set(call) - {"at"} for call in recording.read(file.read_text())]
     assert [call for call in events if call & {"baud", "break"}] == [{"baud"}, {"break"}, {"baud"}]
-    node = FakeNode()
+    node = BusNode()
     assert Call(f"replay {file}", node).code == 0
-    assert node.counters["breaks"] == 1 and node.baud == 115200 and node.axes[0].homed
+    assert node.counters["breaks"] == 1 and node.port.hears(115200) and node.homed()
     rows = Call(f"replay --show {file}").out.splitlines()
     assert [
         row.split(" s  ")[1] for row in rows if " baud from" in row or row.endswith("break")
-    ] == ["1000000 baud from here on", "break", "115200 baud from here on"]
+    ] == ["500000 baud from here on", "break", "115200 baud from here on"]
 
 
 def test_a_record_that_broke_off_at_another_baud_rate_leaves_the_nodes_at_the_first_one(tmp_path):
-    file = recorded(tmp_path, "baud 1000000 1 -- status")
+    file = recorded(tmp_path, "baud 500000 1 -- status")
     rows = file.read_text().splitlines()
     file.write_text("\n".join(rows[:-2]))  # without the break and what follows it
-    assert recording.last_baud(recording.read(file.read_text())) == 1_000_000
+    assert recording.last_baud(recording.read(file.read_text())) == 500_000
     call = Call(f"replay {file}")
-    assert call.code == 0 and call.bus.nodes[0].baud == call.bus.baud == 115200
+    assert call.code == 0 and call.bus.nodes[0].port.hears(115200) and call.bus.baud == 115200
 
 
 def test_a_record_with_another_baud_rate_is_not_replayed_through_a_gateway(tmp_path):
-    bus = FakeBus(FakeNode())
+    bus = Rs485Bus(BusNode())
     bus.handshake = False
     assert "the bus of the nodes itself" in sentence(
         Call(f"replay {recorded(tmp_path, 'baud 9600 1')}", bus=bus), 3
@@ -189,19 +191,27 @@ def test_watch_prints_the_state_at_the_given_interval_and_ends_in_time():
 
 
 def test_watch_sends_requests_often_enough_for_the_watchdog():
-    node = FakeNode()
+    node = BusNode()
     Call("watch --every 10s --for 20s", node)
     assert node.executed.count("status") > 100
 
 
+def press_estop(node):
+    node.axes[0].causes = FAULT["estop"]
+    node.run(1)
+
+
 def test_fault_reports_cause_position_and_what_to_do():
     assert "no fault is latched" in Call("fault").out
-    node = FakeNode()
-    node.axes[0].active_faults = node.axes[0].faults = ESTOP
-    node.axes[0].events, node.axes[0].signal = 4, dict(faults=0, first=1)
+    node = BusNode()
+    press_estop(node)
+    node.set_axis(ENCODER_EVENTS=4)
+    node.set_feedback(FIRST_SIGNAL_FAULTS=1)
     out = Call("fault", node).out
     assert (
-        out.startswith("node 1 axis 0: emergency stop\n  first     emergency stop, at 800nm\n")
+        out.startswith(
+            "node 1 axis 0: emergency stop\n  first     emergency stop, at 1.50703125um\n"
+        )
         and "signal too small" in out
     )
     assert "remove the cause, then 'moire reset', then 'moire home'" in out
@@ -209,20 +219,19 @@ def test_fault_reports_cause_position_and_what_to_do():
 
 
 def test_selftest_passes_a_sound_node():
-    call = Call("selftest", FakeNode(axes=2))
+    call = Call("selftest", BusNode(axes=2))
     assert call.code == 0 and call.out.count("passed") == 3 + 2 * 5 and "axis 1 sensor" in call.out
 
 
 def test_selftest_passes_a_sound_node_without_sine_and_cosine():
-    node = FakeNode(absent=SINE)
-    node.axes[0].parameters[PARAMETERS["position_source"].id] = 1
+    node = BusNode(absent=SINE)
     call = Call("selftest", node)
     assert (
         call.code == 0
         and "passed   axis 0 sensor      no illegal edge; built without sine and cosine\n"
         in call.out
     )
-    node.axes[0].events = 1
+    node.set_axis(ENCODER_EVENTS=1)
     assert (
         "FAILED   axis 0 sensor      both quadrature levels changed at once"
         in Call("selftest", node).out
@@ -230,35 +239,34 @@ def test_selftest_passes_a_sound_node_without_sine_and_cosine():
 
 
 def test_fault_of_a_node_without_sine_and_cosine_reports_what_exists():
-    node = FakeNode(absent=SINE)
-    node.axes[0].active_faults = node.axes[0].faults = ESTOP
+    node = BusNode(absent=SINE)
+    press_estop(node)
     assert "emergency stop" in Call("fault", node).out and "signal" not in Call("fault", node).out
 
 
-def spoil_estop(node):
-    node.axes[0].active_faults = ESTOP
-
-
 def spoil_limits(node):
-    node.axes[0].parameters[PARAMETERS["amplitude_low"].id] = 200
+    node.set(amplitude_low=200)
 
 
 def spoil_signal(node):
-    node.axes[0].signal = dict(faults=2, first=2)
+    node.set_feedback(SIGNAL_FAULTS=2, FIRST_SIGNAL_FAULTS=2)
 
 
 def spoil_parameter(node):
-    node.axes[0].parameters[PARAMETERS["pwm_frequency"].id] = 1
+    node.force("pwm_frequency", 1)
 
 
 def spoil_register(node):
-    node.registers[0] = 5
+    def once_identified(name, fields):
+        node.map_crc = MAP_CRC if name == "identify" else 5
+
+    node.port.on_request = once_identified
 
 
 @pytest.mark.parametrize(
     "spoil, name, message",
     [
-        (spoil_estop, "axis 0 interlock", "emergency stop pressed"),
+        (press_estop, "axis 0 interlock", "emergency stop pressed"),
         (spoil_limits, "axis 0 sensor", "amplitude 103, allowed 200 to 160"),
         (spoil_signal, "axis 0 sensor", "signal too large"),
         (spoil_parameter, "axis 0 parameters", "out of range: pwm_frequency"),
@@ -266,7 +274,7 @@ def spoil_register(node):
     ],
 )
 def test_selftest_finds_and_names_what_is_wrong(spoil, name, message):
-    node = FakeNode()
+    node = BusNode()
     spoil(node)
     call = Call("selftest", node)
     assert f"FAILED   {name}" in call.out and message in call.out
@@ -279,12 +287,12 @@ def test_selftest_finds_and_names_what_is_wrong(spoil, name, message):
 
 
 def test_selftest_counts_errors_on_the_bus():
-    bus, count = FakeBus(FakeNode()), [0]
+    bus, count = Rs485Bus(BusNode()), [0]
 
     def every_hundredth(word):
         count[0] += 1
         return [word ^ 1] if count[0] % 100 == 0 and count[0] > 300 else [word]
 
-    bus.to_node = every_hundredth
+    bus.to_nodes = every_hundredth
     call = Call("selftest", bus=bus)
     assert "FAILED   bus" in call.out and "frames_bad" in call.out and "repeats" in call.out

@@ -4,39 +4,45 @@ test_firmware_scope has the side of the node.
 """
 
 import math
-import random
 
 import pytest
 
 from moire.analysis.scope import NoRecord, Scope, excite, lsb
 from moire.client.bus import Bus
 from moire.errors import OutOfRange, Refused
-from tb.fakes.fake_node import FakeBus, FakeNode
+from tb.fakes.bus_node import START, BusNode
+from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
-
-PERIOD = 65536
+from twin.compiled.node import DEFINES, PERIOD, Axis, signed
 
 
 def axis_of(node):
-    return Bus(FakeBus(node)).axis()
+    return Bus(Rs485Bus(node)).axis()
 
 
-def low(position):
-    return (position + 2**31) % 2**32 - 2**31
+class Ramp(Axis):
+    """An axis that moves by itself, by the same distance in each tick, and records where it was."""
 
+    def __init__(self, position=START, step=PERIOD // 16):
+        super().__init__(position)
+        self.step, self.ticks = step, 0
 
-def ramp(node, count=12, step=PERIOD // 4):
-    """Samples that end where the axis is: 62 or 63 units of 64 cycles apart."""
-    end = node.axes[0].position
-    node.samples = [
-        (low(end - (count - 1 - n) * step), 3 * n, -16384 + n, 62 + n % 2) for n in range(count)
-    ]
+    def tick(self):
+        self.machine += self.step
+        self.ticks += 1
+        self.word[DEFINES["AXIS_COMMAND"]] = -16384 + self.ticks & 0xFFFF
+
+    @property
+    def error(self):
+        return 3 * self.ticks
 
 
 def test_scope_settings_are_sent_in_counts():
-    node = FakeNode()
+    node = BusNode()
     Scope(axis_of(node)).arm("error", before=7, every="2.5ms", level="1.6um")
-    assert node.armed == dict(trigger=3, before=7, every=10, level=2 * PERIOD, amplitude=0)
+    assert node.written("arm_scope") == [
+        dict(axis=0, trigger=3, before=7, every=10, level=2 * PERIOD, amplitude=0)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -50,45 +56,43 @@ def test_scope_settings_are_sent_in_counts():
     ],
 )
 def test_wrong_scope_settings_are_not_sent(wrong, message):
-    node = FakeNode()
+    node = BusNode()
     with pytest.raises(OutOfRange, match=message):
         Scope(axis_of(node)).arm(**wrong)
-    assert node.armed is None
+    assert "arm_scope" not in node.executed
 
 
 def test_samples_are_read_in_seconds_and_nm():
-    node = FakeNode()
-    ramp(node)
+    node = BusNode(axes=[Ramp()])
     scope = Scope(axis_of(node))
-    scope.arm("now", before=4)
+    scope.arm("error", before=4, level="100nm")  # 8192 / 65536 period
     record = scope.wait()
-    assert record.before == 4 and record.time_s[4] == 0 and len(record.time_s) == 12
-    assert record.time_s[5] - record.time_s[4] == pytest.approx(63 * 64 / 4e6) and record.time_s[
-        0
-    ] == pytest.approx(-250 * 64 / 4e6)
-    assert (
-        record.position_nm[-1] == pytest.approx(123456 / PERIOD * 800)
-        and record.position_nm[1] - record.position_nm[0] == 200
-    )
-    assert record.error_nm[2] == pytest.approx(6 / PERIOD * 800) and record.command[0] == -0.5
+    assert record.before == 4 and record.time_s[4] == 0 and len(record.time_s) == 128
+    # every 4000 cycles, in steps of 64
+    assert record.time_s[5] == pytest.approx(0.001, abs=64 / 4e6)
+    assert record.time_s[127] == pytest.approx(0.123, abs=64 / 4e6)
+    assert record.time_s[0] == pytest.approx(-0.004, abs=64 / 4e6)
+    assert record.error_nm[3] < 100 <= record.error_nm[4]
+    for position, error, command in zip(record.position_nm, record.error_nm, record.command):
+        ticks = round(error / 800 * PERIOD / 3)
+        assert ticks % 4 == 0 and error == pytest.approx(3 * ticks / PERIOD * 800)
+        assert position == pytest.approx((START + ticks * PERIOD // 16) / PERIOD * 800)
+        assert command == (-16384 + ticks) / 32768
 
 
 def test_positions_are_complete_where_the_low_word_wraps():
-    node = FakeNode()
-    node.axes[0].position = node.axes[0].target = 5 * 2**32 + 40 * PERIOD
-    ramp(node, count=20, step=10 * PERIOD)
+    start = 5 * 2**32 - 300 * PERIOD
+    node = BusNode(axes=[Ramp(start, step=2 * PERIOD)])
     scope = Scope(axis_of(node))
     scope.arm()
-    record = scope.read()
-    assert (
-        record.position_nm[-1] == (5 * 65536 + 40) * 800
-        and record.position_nm[0] == (5 * 65536 + 40 - 190) * 800
-    )
+    positions = scope.wait().position_nm
+    first, last = 5 * 65536 - 300, positions[-1] / 800
+    assert first <= positions[0] / 800 < first + 200 < 5 * 65536 < last
+    assert {b - a for a, b in zip(positions, positions[1:])} == {8 * 800}
 
 
 def test_a_missing_trigger_and_a_scope_that_is_not_armed_are_one_sentence():
-    node = FakeNode()
-    scope = Scope(axis_of(node))
+    scope = Scope(axis_of(BusNode()))
     with pytest.raises(NoRecord, match="the scope of node 1 has no record: arm it first"):
         scope.wait()
     scope.arm("motion")
@@ -98,8 +102,7 @@ def test_a_missing_trigger_and_a_scope_that_is_not_armed_are_one_sentence():
 
 
 def test_commands_arm_move_and_read_in_one_call(tmp_path):
-    node = FakeNode()
-    ramp(node)
+    node = BusNode()
     file, picture = tmp_path / "move.csv", tmp_path / "move.png"
     call = Call(
         [
@@ -126,14 +129,14 @@ def test_commands_arm_move_and_read_in_one_call(tmp_path):
     rows = file.read_text().splitlines()
     assert (
         rows[0] == "time_s,position_nm,error_nm,command"
-        and len(rows) == 13
+        and len(rows) == 129
         and picture.read_bytes().startswith(b"\x89PNG")
     )
     reported = Call(["scope", "arm", "--", "scope", "read", str(file), "--json"], node).results[1]
-    assert reported["before"] == 0 and len(reported["position_nm"]) == 12
+    assert reported["before"] == 0 and len(reported["position_nm"]) == 128
     assert (reported["command"], reported["action"]) == ("scope", "read") and len(
         reported["drive_command"]
-    ) == 12
+    ) == 128
 
 
 def test_a_scope_without_a_record_is_exit_code_1(tmp_path):
@@ -143,46 +146,70 @@ def test_a_scope_without_a_record_is_exit_code_1(tmp_path):
 # ------------------------------------------------------------------ open loop
 
 
-def answering(node, time_constant_s=0.008, gain=50_000.0):
-    """Samples for identify_samples() every 2 ms, of an axis with a first-order velocity in LSB/s
-    per command.
+class OpenLoop(Axis):
+    """An axis whose velocity follows the open-loop command with a time constant: `gain` is its
+    velocity in 2^-16 period/s per 1/1000 of the command.
     """
-    draw, position, velocity, sign, left = random.Random(1), 0.0, 0.0, 1, 0
-    decay, commands, positions = math.exp(-0.002 / time_constant_s), [0], []
-    for _ in range(128):
-        if left == 0:
-            sign, left = -sign, draw.randrange(1, 9)
-        left -= 1
-        positions.append(round(position))
-        commands.append(3000 * sign)
-        expected = gain * commands[-1] / 1000
-        position += expected * 0.002 + (velocity - expected) * time_constant_s * (1 - decay)
-        velocity = expected + (velocity - expected) * decay
-    node.samples = [
-        (position, 0, command, 125 * (n > 0))
-        for n, (position, command) in enumerate(zip(positions, commands))
-    ]
-    node.axes[0].position = node.axes[0].target = positions[-1]
+
+    TIME_CONSTANT_S, GAIN, TICK_S = 0.008, 50_000.0, 1 / 4000
+
+    def __init__(self):
+        super().__init__(START)
+        self.exact, self.velocity = 0.0, 0.0
+        self.commands = []  # in each tick of the excitation
+
+    @property
+    def excited(self):
+        loop = DEFINES["AXIS_CONTROL_CLOSED_LOOP_MASK"]
+        return self.enabled and not self.control & loop
+
+    def tick(self):
+        if not self.excited:
+            self.word[DEFINES["AXIS_COMMAND"]] = 0
+            return super().tick()
+        command = signed(self.word.get(DEFINES["AXIS_OPEN_COMMAND"], 0) & 0xFFFF, 16)
+        self.word[DEFINES["AXIS_COMMAND"]] = command & 0xFFFF
+        self.commands.append(command)
+        decay = math.exp(-self.TICK_S / self.TIME_CONSTANT_S)
+        expected = self.GAIN * command / 1000
+        self.exact += expected * self.TICK_S + (self.velocity - expected) * (
+            self.TIME_CONSTANT_S * (1 - decay)
+        )
+        self.velocity = expected + (self.velocity - expected) * decay
+        self.machine = START + round(self.exact)
+        self.interlock()
 
 
 def test_the_open_loop_needs_the_drive_and_sends_amplitude_and_reach():
-    node = FakeNode()
-    answering(node)
+    node = BusNode(axes=[OpenLoop()])
     axis = axis_of(node)
     with pytest.raises(Refused, match="enable it first"):
         excite(axis)
     axis.enable()
-    times, commands, positions = lsb(excite(axis, "25%", "2ms", "80um"))
-    assert node.armed == dict(trigger=0, before=0, every=8, level=100 * PERIOD, amplitude=8192)
-    assert commands[:-1] == [command for _, _, command, _ in node.samples[1:]] and times[
-        1
-    ] == pytest.approx(0.002)
-    assert positions[:2] == [0, node.samples[1][0]]
+    times, commands, positions = lsb(excite(axis, "25%", "2ms", "10mm"))
+    assert node.written("arm_scope")[-1] == dict(
+        axis=0, trigger=0, before=0, every=8, level=12500 * PERIOD, amplitude=8192
+    )
+    assert len(times) == 128 and times[1] - times[0] == pytest.approx(0.002, abs=64 / 4e6)
+    assert set(commands[:-1]) == {8192, -8192}
+    driven = node.axes[0].commands  # 8 ticks in a sample
+    first = next(n for n, command in enumerate(driven) if command)
+    assert commands[:-1] == driven[first::8][:127]
+    assert positions[0] == START and node.state() == "holding"
+
+
+def test_the_open_loop_ends_where_the_axis_has_moved_as_far_as_it_may():
+    node = BusNode(axes=[OpenLoop()])
+    axis = axis_of(node)
+    axis.enable()
+    record = excite(axis, "25%", "2ms", "100nm")
+    assert len(record.time_s) < 128
+    assert abs(record.position_nm[-1] - record.position_nm[0]) > 100
+    assert abs(record.position_nm[-2] - record.position_nm[0]) <= 100
 
 
 def test_tune_without_a_file_drives_and_proposes():
-    node = FakeNode()
-    answering(node)
+    node = BusNode(axes=[OpenLoop()])
     call = Call("tune --bandwidth 40Hz --json", node)
     assert call.code == 0, call.err
     plant = call.results[0]["plant"]

@@ -11,21 +11,30 @@ import pytest
 from moire.client.bus import Bus
 from moire.client.segments import NotInForce, Segments, SegmentTable, read_table, text_of
 from moire.errors import BadFile, OutOfRange
-from tb.fakes.fake_node import FakeBus, FakeNode
+from tb.fakes.bus_node import BusNode
+from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
+from twin.compiled.node import PERIOD
 
 GOOD = ["0, 0", "1, 100", "2, -50", "3, 20"]
 
 
 def node_with_table():
-    node = FakeNode()
-    node.most_segments = 255
-    node.axes[0].homed = True
+    """A homed node; all of these have a segment table."""
+    node = BusNode()
+    node.home()
+    node.set_feedback(SEGMENT_ERROR=-8192 & 0xFFFFFFFF)
     return node
 
 
+def points(node):
+    """The points in the hardware, 2^-16 period."""
+    table = node.feedback_channels[0].segments
+    return [table[border] for border in range(len(table))]
+
+
 def axis_of(node):
-    return Bus(FakeBus(node)).axis()
+    return Bus(Rs485Bus(node)).axis()
 
 
 @pytest.fixture
@@ -115,9 +124,12 @@ def test_a_table_is_written_completely_and_comes_into_force():
         Fraction(-(10**6)), Fraction(10**6), tuple(Fraction(n * 50) for n in range(-15, 16))
     )
     reported = Segments(axis_of(node)).load(table, "rectangle")
-    axis = node.axes[0]
-    assert axis.points == [n * 50 * 65536 // 800 for n in range(-15, 16)]
-    assert [axis.parameters[n] for n in (87, 88, 89, 90)] == [30, 1250 * 65536, -1250 * 65536, 1]
+    assert points(node) == [n * 50 * 65536 // 800 for n in range(-15, 16)]
+    names = ("segment_count", "segment_length", "segment_first", "segments")
+    assert list(map(node.parameter, names)) == [30, 1250 * PERIOD, -1250 * PERIOD, 1]
+    assert node.feedback_channels[0].use == dict(
+        linear=False, segments=30, length=1250 * PERIOD, origin=-1250 * PERIOD
+    )
     assert (reported.in_force, reported.reason, reported.loaded, reported.error_nm) == (
         "rectangle",
         "ok",
@@ -129,16 +141,17 @@ def test_a_table_is_written_completely_and_comes_into_force():
 
 def test_positions_count_from_the_zero_whatever_the_home_offset():
     node = node_with_table()
-    node.axes[0].parameters[51] = 250  # home_offset: 200 um
+    node.set(home_offset=250)  # 200 um
+    node.home()
     table = SegmentTable(Fraction(10**6), Fraction(10**6), (Fraction(0), Fraction(100)))
     segments = Segments(axis_of(node))
     segments.load(table)
-    assert node.axes[0].parameters[89] == 1000 * 65536 and segments.read() == table
+    assert node.parameter("segment_first") == 1000 * PERIOD and segments.read() == table
+    assert node.feedback_channels[0].use["origin"] == 1250 * PERIOD
 
 
 def test_without_a_zero_the_table_waits_and_reports_why():
-    node = node_with_table()
-    node.axes[0].homed = False
+    node = BusNode()
     reported = Segments(axis_of(node)).load(SegmentTable(Fraction(0), Fraction(10**6), (0, 1)))
     assert (reported.in_force, reported.reason) == (
         "off",
@@ -162,15 +175,20 @@ def test_a_table_that_does_not_fit_leaves_the_old_one_in_force(errors, message):
     segments.load(SegmentTable(Fraction(0), Fraction(10**8), (0, 800)))
     with pytest.raises(OutOfRange, match=message):
         segments.load(SegmentTable(Fraction(0), Fraction(10**8), errors))
-    assert node.axes[0].points == [0, 65536] and node.axes[0].parameters[90] == 2
+    assert points(node) == [0, 65536] and node.parameter("segments") == 2
+    assert node.feedback_channels[0].use is not None
 
 
 def test_a_table_that_does_not_read_back_is_not_put_in_force():
+    class Damaging(dict):
+        def __setitem__(self, border, point):
+            super().__setitem__(border, point + 1)
+
     node = node_with_table()
-    node.damages_points = True
+    node.feedback_channels[0].segments = Damaging()
     with pytest.raises(NotInForce, match="does not hold"):
         Segments(axis_of(node)).load(SegmentTable(Fraction(0), Fraction(10**6), (0, 100)))
-    assert node.axes[0].parameters[90] == 0
+    assert node.parameter("segments") == 0 and node.feedback_channels[0].use is None
 
 
 def test_the_file_of_a_table_reads_back_digit_by_digit(tmp_path):
@@ -209,7 +227,7 @@ def test_the_commands_load_report_use_and_save(file, tmp_path):
     assert Call(["segments", "save", saved], node).out == f"3 segments saved in {saved}\n"
     assert read_table(saved).segments == 3
     assert "off; 4 points loaded, at most 256" in Call("segments use off", node).out
-    assert "reads" not in Call(["segments", "load", str(file(*GOOD)), "--dry"], FakeNode()).err
+    assert "reads" not in Call(["segments", "load", str(file(*GOOD)), "--dry"], BusNode()).err
 
 
 def test_a_wrong_file_is_one_sentence_and_nothing_is_written(file):
@@ -217,12 +235,15 @@ def test_a_wrong_file_is_one_sentence_and_nothing_is_written(file):
     assert "line 2: the position 0nm is there twice" in sentence(
         Call(["segments", "load", str(file("0, 0", "0, 1", "1, 1"))], node), 2
     )
-    assert node.axes[0].points == [] and not node.axes[0].writes
+    assert not node.written("set_segments") and not node.written("set_parameter")
 
 
 def test_a_node_without_a_table_reports_it_in_one_sentence(file):
-    assert "was built without this function" in sentence(Call("segments status"), 1)
-    assert "without a segment table" in sentence(Call(["segments", "load", str(file(*GOOD))]), 2)
+    node = BusNode(absent=("segments",))
+    assert "was built without this function" in sentence(Call("segments use linear", node), 1)
+    assert "without a segment table" in sentence(
+        Call(["segments", "load", str(file(*GOOD))], node), 2
+    )
 
 
 def test_parameters_are_saved_and_loaded_with_the_table(tmp_path):
@@ -231,10 +252,7 @@ def test_parameters_are_saved_and_loaded_with_the_table(tmp_path):
     assert "parameters and a segment table saved" in Call(["params", "save", saved], node).out
     call = Call(["params", "load", saved], other)
     assert call.code == 0 and "and a segment table loaded" in call.out
-    assert (
-        other.axes[0].points == node.axes[0].points
-        and other.axes[0].parameters == node.axes[0].parameters
-    )
+    assert points(other) == points(node) and other.parameters() == node.parameters()
     reported = json.loads((tmp_path / "stage.json").read_text())
     (tmp_path / "stage.json").write_text(json.dumps({**reported, "segment_points": ["1"]}))
     assert "no list of whole numbers" in sentence(Call(["params", "load", saved], other), 2)

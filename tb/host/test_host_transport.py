@@ -12,14 +12,15 @@ from moire.bus.protocol import ODD_ADDRESSES
 from moire.bus.transport import SerialBus
 from moire.client.bus import Bus
 from moire.errors import PortError, UnknownName
-from tb.fakes.fake_node import FakeBus, FakeNode
+from tb.fakes.bus_node import BusNode
+from tb.fakes.rs485_bus import Rs485Bus
 
 
 class FakePort:
     """Replaces serial.Serial: turns bytes and parity into words for a node, as the bus does."""
 
     def __init__(self, name="fake", mark=True, node=None, **settings):
-        self.settings, self.node, self.sync = settings, node or FakeNode(), mark
+        self.settings, self.node, self.sync = settings, node or BusNode(), mark
         self.held, self.timeout, self.words, self.answers, self.is_open = (
             "N",
             0,
@@ -43,7 +44,7 @@ class FakePort:
             ones = byte.bit_count() & 1
             ninth = {"M": 1, "S": 0, "E": ones, "O": ones ^ 1}[self.held]
             self.words.append(byte | ninth << 8)
-            self.answers += bytes(self.node.receive_word(self.words[-1]))
+            self.answers += bytes(self.node.port.receive(self.words[-1]))
 
     def flush(self):
         pass
@@ -80,7 +81,7 @@ def serial_bus(parity="auto", **port):
     "mark, parity", [(True, "auto"), (True, "odd"), (False, "auto"), (False, "odd"), (True, "mark")]
 )
 def test_an_exchange_has_the_ninth_bit_on_command_bytes_only(mark, parity):
-    bus, port = serial_bus(parity, mark=mark, node=FakeNode(address=7))
+    bus, port = serial_bus(parity, mark=mark, node=BusNode(address=7))
     assert Bus(bus).axis(address=7).status().state == "off"
     assert [word for word in port.words if word >> 8] == [0x127, 0x117] * 3
     assert port.node.counters["frames_bad"] == 0 and port.node.counters["frames_good"] == 3
@@ -113,7 +114,7 @@ def test_mark_reaches_all_addresses_and_odd_parity_eight():
 
 
 def test_find_calls_only_addresses_that_odd_parity_reaches():
-    bus, port = serial_bus(mark=False, node=FakeNode(address=11))
+    bus, port = serial_bus(mark=False, node=BusNode(address=11))
     client = Bus(bus)
     client.FIND_ANSWER_S = 0.001
     assert [node.address for node in client.find()] == [11]
@@ -270,7 +271,7 @@ def test_open_bus_opens_a_simulated_machine_by_name(monkeypatch):
     class EntryPoint:
         @staticmethod
         def load():
-            return lambda machine, seed: opened.append(machine) or FakeBus(FakeNode())
+            return lambda machine, seed: opened.append(machine) or Rs485Bus(BusNode())
 
     def entry_points(**which):
         assert which == {"group": "moire.ports", "name": "twin"}

@@ -11,8 +11,7 @@ import pytest
 from PIL import Image
 
 from moire.analysis import tune
-from tb.control.biquad_cascade import BiquadCascade
-from tb.control.pid_servo import PidServo
+from tb.control.motion_engine import Axis, Filter
 
 TICK = 1 / 4000
 
@@ -131,37 +130,27 @@ def test_gains_hold_bandwidth_and_margin(plant, bandwidth_hz, margin):
 
 
 def test_the_servo_itself_comes_to_rest_with_these_gains():
-    """With the model of pid_servo, which equals the RTL, around the plant."""
+    """With the model of motion_engine, which equals the RTL, around the plant."""
     plant = PLANTS[1]
     tuning = tune.propose(plant, 60, filters=[tune.notch(700, TICK), tune.low_pass(900, TICK)])
-    servo = PidServo()
-    settings = dict(
+    axis = Axis(filters=2)
+    axis.settings |= dict(
         kp=tuning.kp,
         ki=tuning.ki,
         kd=tuning.kd,
         kv=tuning.kv,
-        ka=tuning.ka,
-        closed_loop=1,
-        output_limit=32767,
-        integral_limit=32767,
-        filters_in_use=3,
+        ka=tuning.ka << 8,
+        output_limit=32767 << 16,
+        integral_limit=32767 << 24,
     )
-    for section, values in enumerate(tuning.filters):
-        for number, value in enumerate(values):
-            servo.clk(
-                coefficient_write=1, coefficient_address=8 * section + number, coefficient=value
-            )
+    for section, values in zip(axis.filters, tuning.filters, strict=True):
+        section.coefficients, section.in_use = [value << 2 for value in values], 1
     position, velocity, queue = 0.0, 0.0, [0] * plant.delay
     reached = []
     for n in range(700):
-        inputs = settings | dict(
-            target=2000 if n > 4 else 0, position=round(position), velocity=round(velocity)
-        )
-        valid, command, *_ = servo.clk(tick=1, **inputs)
-        while not (valid and servo.ready):
-            done, new, *_ = servo.clk(**inputs)
-            valid, command = (1, new) if done else (valid, command)
-        queue.append(command)
+        axis.target = 2000 if n > 4 else 0
+        axis.tick(round(position), 1000)
+        queue.append(axis.command)
         velocity = plant.a * velocity + plant.b * queue.pop(0)
         position += velocity
         reached.append(position)
@@ -187,12 +176,10 @@ def test_a_resonance_is_found_and_notched():
 def test_filters_pass_a_constant_exactly_in_the_block(make):
     values = make(300, TICK)
     assert sum(values) == tune.COEFFICIENT and all(-1 << 31 <= v < 1 << 31 for v in values)
-    block = BiquadCascade(1)
-    block.coefficients[0][:5] = values
+    section = Filter()
+    section.coefficients, section.in_use = [value << 2 for value in values], 1
     for n in range(80):
-        _, _, y = block.clk(in_use=1, valid_in=1, x=1000 if n > 3 else 0)
-        while block.n is not None:
-            _, _, y = block.clk(in_use=1)
+        y = section.sample(1000 if n > 3 else 0, passing=0)
     assert abs(y - 1000) <= 1
 
 

@@ -17,10 +17,10 @@ from moire.client.job import Job
 from moire.client.settings import Settings
 from moire.errors import MotionFailed, OutOfRange, Refused, UnknownName
 from moire.made.bus_tables import SETTINGS
-from tb.fakes.firmware_bus import FakeNodeBus
+from tb.fakes.rs485_bus import Rs485Bus
 from tb.firmware.test_turn import Station
-from twin.compiled.node import Axis, FakeNode
-from twin.compiled.peripherals import FakePeripherals, I2c, PeerPort, Sensor
+from twin.compiled.node import Axis, CompiledNode
+from twin.compiled.peripherals import I2c, PeerPort, PeripheralParts, Sensor
 from twin.compiled.peripherals import Table as Worm
 
 ADDRESS = 2
@@ -29,7 +29,7 @@ ADDRESS = 2
 class Panel:
     def __init__(self, machine=None):
         self.machine = machine or Station()
-        self.bus = Bus(FakeNodeBus(self.machine))
+        self.bus = Bus(Rs485Bus(self.machine))
         self.node = self.bus.node(ADDRESS)
         self.table, self.settings = IndexingTable(self.node), Settings(self.node)
 
@@ -38,7 +38,7 @@ class Panel:
         out, err = io.StringIO(), io.StringIO()
         code = command_line.main(
             ["--address", str(ADDRESS), *text.split()],
-            lambda options: FakeNodeBus(self.machine),
+            lambda options: Rs485Bus(self.machine),
             out,
             err,
         )
@@ -85,7 +85,7 @@ def test_whatever_interrupts_the_wait_stops_the_table():
 
     with pytest.raises(KeyboardInterrupt):
         panel.table.turn("90deg", progress=impatient)
-    panel.bus.transport.wait(0.5)
+    panel.bus.transport.wait(0.3)
     assert panel.table.state().ended == "stopped" and panel.machine.status()["state"] == "holding"
 
 
@@ -139,7 +139,7 @@ def test_saved_settings_are_restored():
 
 
 def test_a_node_of_the_other_image_reports_not_built():
-    panel = Panel(FakeNode(Axis()))
+    panel = Panel(CompiledNode(Axis()))
     with pytest.raises(Refused, match="built without this function"):
         panel.settings.get("turn_direction")
     with pytest.raises(Refused, match="built without this function"):
@@ -150,10 +150,10 @@ def sub_node():
     """A sub-node in legacy mode, which counts its stations itself, with its EEPROM."""
     source = random.Random(1)
     panel = Panel(
-        FakeNode(
+        CompiledNode(
             Axis(),
             image="station",
-            peripherals=FakePeripherals(Sensor(source, Worm(source)), PeerPort(), I2c()),
+            peripherals=PeripheralParts(Sensor(source, Worm(source)), PeerPort(), I2c()),
         )
     )
     panel.settings.load({"peer_role": "sub", "peer_mode": "legacy"})

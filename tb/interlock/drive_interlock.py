@@ -10,12 +10,13 @@ LIMIT_LOW, LIMIT_HIGH, ESTOP = (FAULTS[name] for name in ("limit_low", "limit_hi
 FOLLOWING_ERROR, ENCODER = FAULTS["following_error"], FAULTS["encoder"]
 BUS_WATCHDOG, DRIVE, CPU = (FAULTS[name] for name in ("bus_watchdog", "drive", "cpu"))
 PROFILE_UNDERRUN, STEP_OVERRUN = FAULTS["profile_underrun"], FAULTS["step_overrun"]
+SERVO_OVERRUN = FAULTS["servo_overrun"]
 LATCH_ALWAYS = ESTOP | DRIVE | CPU
 
 INPUTS = dict.fromkeys(
     """enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault
-    encoder_fault watchdog_expired cpu_trap profile_underrun step_overrun following_limit
-    error_valid error position valid_in command_in""".split(),
+    encoder_fault watchdog_expired cpu_trap profile_underrun step_overrun servo_overrun
+    error_valid error_too_far position valid_in command_in""".split(),
     0,
 )
 
@@ -40,6 +41,7 @@ class DriveInterlock:
             i["cpu_trap"],
             i["profile_underrun"],
             i["step_overrun"],
+            i["servo_overrun"],
         )
         return sum(1 << n for n, cause in enumerate(present) if cause)
 
@@ -76,10 +78,10 @@ class DriveInterlock:
                 self.fault_position = i["position"]
         self.faults = held | arrived
 
-        if not self.enabled or not i["closed_loop"] or i["following_limit"] == 0:
+        if not self.enabled or not i["closed_loop"]:
             self.too_far = self.error_counts = 0
         elif i["error_valid"]:
-            self.too_far = int(self.error_counts and abs(i["error"]) > i["following_limit"])
+            self.too_far = int(self.error_counts and i["error_too_far"])
             self.error_counts = 1
         self.enabled = int(i["enable_request"] and not self.faults)
 

@@ -20,6 +20,7 @@ from tb.interlock.drive_interlock import (
     LIMIT_HIGH,
     LIMIT_LOW,
     PROFILE_UNDERRUN,
+    SERVO_OVERRUN,
     STEP_OVERRUN,
     DriveInterlock,
 )
@@ -34,7 +35,9 @@ CAUSES = dict(
     cpu_trap=CPU,
     profile_underrun=PROFILE_UNDERRUN,
     step_overrun=STEP_OVERRUN,
+    servo_overrun=SERVO_OVERRUN,
 )
+STROBES = ("profile_underrun", "servo_overrun")  # causes that end by themselves
 ALWAYS = ("estop", "drive_fault", "cpu_trap")
 SIGNED = ("command_out", "fault_position")
 HIGH, LOW = (1 << 15) - 1, -1 << 15
@@ -66,7 +69,8 @@ class Interlock:
         }
         assert self.out == want, f"{self.inputs}: the pins are {self.out}, the model has {want}"
         await FallingEdge(self.dut.clk)
-        self.inputs.update(reset_faults=0, error_valid=0, valid_in=0, profile_underrun=0)
+        self.inputs.update(reset_faults=0, error_valid=0, valid_in=0)
+        self.inputs.update(dict.fromkeys(STROBES, 0))
         return self.out
 
     async def enable(self):
@@ -113,7 +117,7 @@ async def a_fault_is_cleared_only_by_reset_with_neither_request_nor_cause(dut):
     for name, bit in CAUSES.items():
         await interlock.enable()
         await interlock.clk(**{name: 1})
-        strobe = name == "profile_underrun"  # this cause ends by itself
+        strobe = name in STROBES
         assert (await interlock.clk(reset_faults=1))[
             "faults"
         ] == bit  # requested, and the cause is present
@@ -224,46 +228,35 @@ async def a_limit_switch_is_a_fault_unless_homing(dut):
         await interlock.clk(homing=0, **{switch: 0})
 
 
-async def measure(interlock, error, times=2):
+async def measure(interlock, too_far, times=2):
     for _ in range(times):
-        await interlock.clk(error_valid=1, error=error)
+        await interlock.clk(error_valid=1, error_too_far=too_far)
         await interlock.clk()
     return interlock.out["faults"]
 
 
 @cocotb.test()
-async def the_following_error_is_checked_against_its_limit(dut):
+async def a_following_error_is_a_fault_in_closed_loop(dut):
     interlock = await Interlock(dut).reset()
-    top, bottom = (1 << 31) - 1, -1 << 31
-    for limit, good, bad in (
-        (1, 1, 2),
-        (100, -100, 101),
-        (100, 100, -101),
-        (top, top, bottom),
-        (top - 1, 1 - top, top),
-    ):
-        await interlock.enable()
-        await interlock.clk(closed_loop=1, following_limit=limit)
-        assert await measure(interlock, good, 5) == 0
-        assert await measure(interlock, bad, 1) == FOLLOWING_ERROR
-    for setting in (
-        dict(following_limit=0),
-        dict(following_limit=1, closed_loop=0),
-        dict(closed_loop=1, following_limit=1 << 31),
-    ):
-        await interlock.enable()
-        await interlock.clk(**setting)
-        assert await measure(interlock, bottom, 5) == 0  # not checked; open loop; the largest limit
+    await interlock.enable()
+    await interlock.clk(closed_loop=1)
+    assert await measure(interlock, 0, 5) == 0
+    await interlock.clk(error_too_far=1)  # without error_valid
+    assert await measure(interlock, 0, 1) == 0
+    assert await measure(interlock, 1, 1) == FOLLOWING_ERROR
+    await interlock.clk(closed_loop=0)
+    await interlock.enable()
+    assert await measure(interlock, 1, 5) == 0
 
 
 @cocotb.test()
 async def an_error_measured_before_the_drive_was_on_does_not_count(dut):
     interlock = await Interlock(dut).reset()
-    await interlock.clk(closed_loop=1, following_limit=10)
-    await measure(interlock, 5000, 3)
+    await interlock.clk(closed_loop=1)
+    await measure(interlock, 1, 3)
     await interlock.enable()
-    assert await measure(interlock, 5000, 1) == 0  # it may have been measured before
-    assert await measure(interlock, 5000, 1) == FOLLOWING_ERROR
+    assert await measure(interlock, 1, 1) == 0  # it may have been measured before
+    assert await measure(interlock, 1, 1) == FOLLOWING_ERROR
     assert (await interlock.clk())["causes_now"] == 0  # the drive is off: nothing prevents a reset
 
 
@@ -271,9 +264,9 @@ async def an_error_measured_before_the_drive_was_on_does_not_count(dut):
 async def latency_is_2_from_a_following_error_to_enabled_low(dut):
     interlock = await Interlock(dut).reset()
     await interlock.enable()
-    await interlock.clk(closed_loop=1, following_limit=10)
+    await interlock.clk(closed_loop=1)
     await measure(interlock, 0)
-    assert (await interlock.clk(error_valid=1, error=11))["enabled"] == 1
+    assert (await interlock.clk(error_valid=1, error_too_far=1))["enabled"] == 1
     out = await interlock.clk()
     assert (out["enabled"], out["first_fault"]) == (0, FOLLOWING_ERROR)
 
@@ -335,15 +328,14 @@ async def any_inputs_match_the_model(dut):
             valid_in=rare(3),
             command_in=random.choice((HIGH, LOW, 0, random.randrange(LOW, HIGH))),
             error_valid=rare(4),
-            error=random.choice((0, -3, random.randrange(-1 << 31, 1 << 31))),
+            error_too_far=rare(3),
             position=random.randrange(-1 << 47, 1 << 47),
             profile_underrun=rare(150),
+            servo_overrun=rare(150),
         )
         for name in (*CAUSES, "enable_request", "closed_loop", "homing"):
-            if name != "profile_underrun" and rare(40):
+            if name not in STROBES and rare(40):
                 inputs[name] = rare(5) if name in CAUSES else random.getrandbits(1)
-        if rare(60):
-            inputs["following_limit"] = random.choice((0, 2, random.getrandbits(32)))
         await interlock.clk(rst=rare(700), **inputs)
 
 

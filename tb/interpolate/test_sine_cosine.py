@@ -37,7 +37,6 @@ SETTINGS = dict(
     point=0,
     value=0,
     swap=0,
-    shift=0,
     shift_periods=0,
 )
 AMPLITUDE = 0.84  # of full scale: leaves room for the disturbances
@@ -155,7 +154,7 @@ class Chain:
     def follow(self, sin, cos):
         phase = phase_of(self.w, sin, cos)
         step, overspeed = self.tracker.follow(phase)
-        return self.unwrap.step(1, step, phase, 0, 0)[1], overspeed
+        return self.unwrap.step(1, step, phase, 0)[1], overspeed
 
 
 async def begin(dut):

@@ -50,7 +50,7 @@ class Scale:
             await FallingEdge(dut.clk)
             overspeed |= int(dut.overspeed.value)
         step, expected_overspeed = self.tracker.follow(phase)
-        position = self.unwrap.step(1, step, phase, 0, 0)[1]
+        position = self.unwrap.step(1, step, phase, 0)[1]
         for cycle in range(3):
             disagreement = self.coarse.step(
                 0, int(cycle == 0), 0, step, dut.count.value.to_signed(), LIMIT

@@ -37,7 +37,6 @@ module tracking_bench (
         .valid        (stepped),
         .step,
         .phase        (tracked_phase),
-        .shift        (1'b0),
         .shift_periods(32'sd0),
         .done,
         .position

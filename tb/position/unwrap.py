@@ -6,12 +6,11 @@ class Unwrap:
     def __init__(self):
         self.position, self.started = 0, False
 
-    def step(self, valid, step, phase, shift, shift_periods):
+    def step(self, valid, step, phase, shift_periods):
         if valid:
             self.position += step if self.started else 0
             self.position += phase - self.position % 65536  # 0 where the step leads to the phase
             self.started = True
-        if shift:
-            self.position += shift_periods << 16
+        self.position += shift_periods << 16
         self.position = (self.position + (1 << 47)) % (1 << 48) - (1 << 47)
         return int(valid), self.position

@@ -65,8 +65,8 @@ class RegisterBlock:
             f"{r.name}_read": int(self.awaited == r.word) for r in self.block.registers if r.on_read
         }
         outputs = {
-            f.port: self.value[f.port]
-            for r, f in self.block.fields
+            f.port: 0 if f.momentary and not self.pulse[f"{r.name}_written"] else self.value[f.port]
+            for r, f in self.block.own_fields
             if f.kind == "setting" and not f.passed
         }
         return {"rdata": self.rdata, **outputs, **self.pulse, **read}

@@ -20,7 +20,15 @@ class RegisterMemory:
     def ready(self):
         return int(self.count == FILL)
 
-    def step(self, select=0, write=0, address=0, wdata=0, rst=0):
+    def stores(self, hold=0, select=0, write=0, address=0, wdata=0, **_):
+        """(word, value) that is stored in this cycle, or None; a low word waits."""
+        if not self.ready:
+            return None if hold else (self.count, self.layout.first(self.count))
+        if select and write and not self.layout.low(address):
+            return address, self.layout.kept(address, wdata)
+        return None
+
+    def step(self, hold=0, select=0, write=0, address=0, wdata=0, rst=0):
         """Advance one cycle; there is no access while ready is low, and none after the write of a
         high word.
         """
@@ -38,6 +46,6 @@ class RegisterMemory:
             self.wdata_low = wdata
         elif select and write and layout.high(address):
             self.commit = layout.place(address) - 1
-        self.count += not self.ready
+        self.count += not self.ready and not hold
         if rst:
             self.reset()

@@ -7,7 +7,7 @@ import random
 
 import cocotb
 import pytest
-from cocotb.triggers import FallingEdge, RisingEdge
+from cocotb.triggers import FallingEdge, RisingEdge, Timer
 
 from tb.bench import run, start
 from tb.registers.register_block import WORD
@@ -29,7 +29,7 @@ class Bus:
         self.known = False
 
     async def begin(self):
-        await start(self.dut, select=0, write=0, address=0, wdata=0)
+        await start(self.dut, hold=0, select=0, write=0, address=0, wdata=0)
         await self.fill()
         return self
 
@@ -40,11 +40,16 @@ class Bus:
             await self.clk()
         assert int(self.dut.ready.value)
 
-    async def clk(self, select=0, write=0, address=0, wdata=0, rst=0):
+    async def clk(self, select=0, write=0, address=0, wdata=0, rst=0, hold=0):
         dut, model = self.dut, self.model
-        inputs = dict(select=select, write=write, address=address, wdata=wdata, rst=rst)
+        inputs = dict(select=select, write=write, address=address, wdata=wdata, rst=rst, hold=hold)
         for name, level in inputs.items():
             getattr(dut, name).value = level
+        await Timer(1, "ns")
+        if not rst:
+            want = model.stores(**inputs)
+            assert int(dut.stores.value) == int(want is not None)
+            assert not want or (int(dut.stored_at.value), int(dut.stored_value.value)) == want
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         model.step(**inputs)
@@ -74,6 +79,20 @@ async def latency_is_2048_from_the_end_of_rst_to_ready(dut):
     bus = await Bus(dut).begin()  # it counts the cycles
     await bus.clk(rst=1)
     await bus.fill()
+
+
+@cocotb.test()
+async def hold_delays_the_first_values_and_each_is_shown_once(dut):
+    bus = await Bus(dut).begin()
+    await bus.clk(rst=1)
+    shown = []
+    while not bus.model.ready:
+        hold = int(random.random() < 0.3)
+        if not hold:
+            shown.append(bus.model.count)
+        await bus.clk(hold=hold)
+    assert shown == list(range(FILL))
+    assert await bus.read(KP) == 0
 
 
 @cocotb.test()

@@ -4,7 +4,7 @@ after it, by port name.
 """
 
 from tb.common.synchroniser import Synchroniser
-from tb.sense.deglitcher import Deglitcher
+from tb.sense.switch_filter import SwitchFilter
 
 PINS = dict(
     encoder_a="a",
@@ -18,17 +18,16 @@ PINS = dict(
 
 
 class AxisInputs:
-    def __init__(self, limit_cycles):
-        self.limit_cycles = limit_cycles
+    def __init__(self):
         self.pins = {pin: Synchroniser() for pin in PINS}
-        self.limits = {pin: Deglitcher() for pin in PINS if pin.startswith("limit")}
+        self.limits = {pin: SwitchFilter(1) for pin in PINS if pin.startswith("limit")}
 
-    def clk(self, rst=0, **pins):
+    def clk(self, rst=0, limit_tick=0, **pins):
         out = {}
         for pin, output in PINS.items():
             before = self.pins[pin].stages[-1]
             level = self.pins[pin].step(pins[pin], rst)
             if pin in self.limits:
-                level, _ = self.limits[pin].step(self.limit_cycles, before, rst)
+                level = self.limits[pin].step([before], limit_tick, rst)[0]
             out[output] = int(not level) if pin == "drive_fault_n" else level
         return out

@@ -33,26 +33,22 @@ class Level:
 
 class EventFilter:
     def __init__(self, levels=1, settle=4):
-        self.levels, self.settling, self.settle, self.left = (
-            [Level() for _ in range(levels)],
-            settle,
-            0,
-            0,
-        )
-        self.last = 0
+        self.levels, self.settling, self.settle = [Level() for _ in range(levels)], settle, 0
+        self.skipped = self.last = 0
 
     def step(self, skip, required, tolerated, levels, rst=0):
         """`levels` is a list, the lowest bit first; returns the lists filtered, rejected."""
         rejected = [0] * len(self.levels)
+        sample = self.skipped & skip == skip
         if rst or self.settle:
             for own, level in zip(self.levels, levels):
                 own.filtered = level
                 own.forget()
-        elif self.left == 0:
+        elif sample:
             rejected = [
                 own.sample(self.last, tolerated, level) for own, level in zip(self.levels, levels)
             ]
         self.last = max(required, 1) - 1
-        self.left = 0 if rst else skip if self.left == 0 else self.left - 1
+        self.skipped = 0 if rst or sample else self.skipped + 1
         self.settle = self.settling if rst else max(self.settle - 1, 0)
         return [own.filtered for own in self.levels], rejected

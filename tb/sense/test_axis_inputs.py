@@ -11,7 +11,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.sense.axis_inputs import PINS, AxisInputs
 
-LIMIT_CYCLES = 5
+PERIODS, LIMIT_TICK = 8, 3  # of the filter of a limit switch; cycles between its samples
 QUIET = dict.fromkeys(PINS, 0) | dict(drive_fault_n=1)
 SYNCHRONISER = 2  # cycles
 
@@ -20,7 +20,8 @@ class Inputs:
     """The design with the model beside it in every cycle; pins keep their levels."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.pins = dut, AxisInputs(LIMIT_CYCLES), dict(QUIET)
+        self.dut, self.model, self.pins = dut, AxisInputs(), dict(QUIET)
+        self.cycle = 0
 
     async def reset(self):
         await start(self.dut, **self.pins)
@@ -33,21 +34,26 @@ class Inputs:
 
     async def clk(self, rst=0, **pins):
         self.pins |= pins
-        for name, level in (self.pins | dict(rst=rst)).items():
+        self.cycle += 1
+        control = dict(rst=rst, limit_tick=int(self.cycle % LIMIT_TICK == 0))
+        for name, level in (self.pins | control).items():
             getattr(self.dut, name).value = level
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
-        want = self.model.clk(rst, **self.pins)
+        want = self.model.clk(**control, **self.pins)
         got = {name: int(getattr(self.dut, name).value) for name in want}
         assert got == want
         return got
 
 
 @cocotb.test()
-async def latency_is_2_and_LIMIT_CYCLES_more_for_a_limit_switch(dut):
+async def latency_is_2_and_up_to_8_ticks_more_for_a_limit_switch(dut):
     for pin, output in PINS.items():
         inputs = await Inputs(dut).reset()
-        latency = SYNCHRONISER + LIMIT_CYCLES * (pin in inputs.model.limits)
+        latency = SYNCHRONISER
+        if pin in inputs.model.limits:
+            first = -(inputs.cycle + SYNCHRONISER + 1) % LIMIT_TICK  # until a tick sees the level
+            latency += 1 + first + (PERIODS - 1) * LIMIT_TICK
         got = await inputs.clk(**{pin: 1 - QUIET[pin]})
         for cycle in range(1, latency + 3):
             assert got[output] == int(cycle >= latency)
@@ -58,7 +64,7 @@ async def latency_is_2_and_LIMIT_CYCLES_more_for_a_limit_switch(dut):
 async def a_limit_switch_that_bounces_is_filtered(dut):
     inputs = await Inputs(dut).reset()
     for _ in range(3):
-        for _ in range(LIMIT_CYCLES - 1):
+        for _ in range((PERIODS - 1) * LIMIT_TICK):
             assert not (await inputs.clk(limit_high_open=1))["limit_high"]
         assert not (await inputs.clk(limit_high_open=0))["limit_high"]
 
@@ -76,4 +82,4 @@ async def random_pins_match_the_model(dut):
 
 
 def test_axis_inputs():
-    run("axis_inputs", __file__, LIMIT_CYCLES=LIMIT_CYCLES)
+    run("axis_inputs", __file__)

@@ -49,7 +49,7 @@ class Follower:
 
     def follow(self, phase):
         step, _ = self.tracker.follow(phase)
-        return self.unwrap.step(1, step, phase, 0, 0)[1]
+        return self.unwrap.step(1, step, phase, 0)[1]
 
 
 async def strobe(dut, **levels):

@@ -15,7 +15,7 @@ from twin import Axis, Node, Twin, TwinTransport
 
 STEPPER, COUNTER, SERVO = range(3)
 SCALE = SCALES["Z"]
-CLK_HZ = 3_000_000
+CLK_HZ = 6_200_000  # the motion engine needs 1528 cycles a tick for three axes with filters
 NODE = {  # bit n: axis n
     "HAS_SINE": 1 << SERVO,
     "HAS_DRIVE": 1 << STEPPER | 1 << SERVO,
@@ -24,11 +24,12 @@ NODE = {  # bit n: axis n
     "HAS_DAC": 0,
     "HAS_CAPTURE": 1 << COUNTER,
     "HAS_COMPARE": 1 << COUNTER,
+    "HAS_ENCODER_CHECK": 1 << COUNTER,
     "HAS_FILTERS": 1 << SERVO,
 }
 BUILT = (
     {"velocity", "drive", "stepper"},
-    {"velocity", "capture", "compare"},
+    {"velocity", "capture", "compare", "encoder_check"},
     {"sine", "monitor", "harmonics", "recorder", "velocity", "drive", "bridge", "filters"},
 )
 

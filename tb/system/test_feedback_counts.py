@@ -216,7 +216,7 @@ async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut
                 await FallingEdge(dut.clk)
             dut.shift.value, dut.shift_periods.value = 1, periods
             await FallingEdge(dut.clk)
-            dut.shift.value = 0
+            dut.shift.value = dut.shift_periods.value = 0
             await bench.go([])
             assert bench.position() == periods * 4 * QUARTER + QUARTER
 
@@ -224,7 +224,7 @@ async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut
 @cocotb.test()
 async def own_steps_are_counted_in_their_direction_whatever_the_edge_filter_is_set_to(dut):
     bench = await Bench.begin(dut, mode=3, steps=1)
-    dut.deglitch.value = 1000
+    dut.deglitch.value = 63
     count = 0
     for direction in (1, 0, 0, 1):
         dut.own_downward.value = 1 - direction
@@ -258,13 +258,14 @@ async def pulses(dut, pulse, gap, number=20):
 async def pulses_and_gaps_too_short_for_the_edge_filter_are_each_reported(dut):
     bench = await Bench.begin(dut, mode=3)
     grbl = 244  # cycles of 25 MHz: its pulses are high for 9.76 us
-    for needed, pulse, gap, counted, reported in (
-        (10, 10, 10, 20, 0),
-        (10, 9, 30, 0, 20),
-        (10, 30, 9, 1, 19),
-        (250, grbl, 756, 0, 20),
-        (125, grbl, 756, 20, 0),
+    for skip, needed, pulse, gap, counted, reported in (
+        (0, 10, 10, 10, 20, 0),
+        (0, 10, 9, 30, 0, 20),
+        (0, 10, 30, 9, 1, 19),
+        (4, 50, grbl, 756, 0, 20),  # a sample every 5 cycles: 250 cycles
+        (4, 25, grbl, 756, 20, 0),
     ):
+        await bench.write("edge_filter", skip=skip)
         dut.deglitch.value = needed
         before = bench.position()
         assert await pulses(dut, pulse, gap) == reported
@@ -357,7 +358,7 @@ async def a_shift_moves_the_segment_table_with_the_scale(dut):
     assert bench.position() == 20 * QUARTER - 400
     dut.shift.value, dut.shift_periods.value = 1, -7
     await FallingEdge(dut.clk)
-    dut.shift.value = 0
+    dut.shift.value = dut.shift_periods.value = 0
     await bench.go([])
     assert bench.position() == -8 * QUARTER - 400
     await bench.go([1] * 10)

@@ -18,6 +18,7 @@ from twin.nodes.twin import drives
 
 FIRST, SECOND, OWN = range(3)
 NODE = {**drives("HAS_BRIDGE"), "FILTERS": 0, "HAS_OWN_CHAIN": 1 << OWN}
+CLK_HZ = 4_800_000  # the motion engine needs 1171 cycles a tick for three axes
 PERIOD_M = 0.8e-6
 PLACES = 8  # of a period
 LOOKS = 8  # readings at each position: the noise of one is 0.7 nm
@@ -32,6 +33,7 @@ def twin():
         [Node(1, [Axis(), Axis(), Axis()])],
         plant=figures_calibration.HARMONICS_OF_TWIN,
         seed=seed() % 1000,
+        clk_hz=CLK_HZ,
         node_parameters=NODE,
     ) as made:
         yield made

@@ -155,19 +155,20 @@ def test_the_scale_gives_an_edge_a_count_and_never_two_at_once():
     machine = stepper(clk_hz=4_000_000)
     for sign in (1, -1):
         machine.steps(sign, 1000)
-        before = machine.state.scale_counts
+        before = machine.state
         machine.pins(step=0)
-        total = 0
+        total = edges = 0
         for _ in range(40):
             machine.pins(step=1, direction=sign > 0)
             moved = (quarters(machine.watch(0.5e-3)) + 1) % 4 - 1
             machine.pins(step=0)
             moved = numpy.concatenate([moved, (quarters(machine.watch(0.5e-3)) + 1) % 4 - 1])
             assert abs(moved).max() <= 1
-            total += moved.sum()
-        assert (
-            abs(total - (machine.state.scale_counts - before)) <= 1
-        )  # an edge may be between two calls of watch
+            total, edges = total + moved.sum(), edges + abs(moved).sum()
+        after = machine.state
+        # an edge may be between two calls of watch
+        assert abs(total - (after.scale_counts - before.scale_counts)) <= 1
+        assert 0 <= after.scale_changes - before.scale_changes - edges <= 1
         assert abs(total) > 150
 
 

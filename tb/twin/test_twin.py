@@ -7,6 +7,7 @@ import numpy
 import pytest
 
 from twin import Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
+from twin.nodes.twin import CLK_HZ
 
 ASK = {1: 0x111, 2: 0x112}  # "slave, send data": 00 01 address, 9th bit 1
 
@@ -233,7 +234,8 @@ def test_a_node_drives_any_machine():
 
 
 def test_axes_of_one_node_have_machines_of_their_own():
-    with Twin([Node(1, [Axis("stage"), Axis("worm_table")]), Node(2)], seed=1) as twin:
+    nodes = [Node(1, [Axis("stage"), Axis("worm_table")]), Node(2)]
+    with Twin(nodes, seed=1, clk_hz=2 * CLK_HZ) as twin:  # a servo tick serves two axes
         twin.run(0.25)  # a second axis takes the firmware longer to start
         assert [machine.kind for machine in twin.machines] == [
             "stage",

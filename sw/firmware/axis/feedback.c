@@ -29,9 +29,9 @@ uint8_t feedback_write_register(uint32_t offset, unsigned n, uint32_t value) {
         if (value & ~CAPTURE_INDEX) feature = AXIS_BUILT_CAPTURE_MASK;
         break;
     case FEEDBACK_INDEX:
-    case FEEDBACK_COUNTS_PER_REVOLUTION:
     case FEEDBACK_INDEX_EVENTS:
     case FEEDBACK_CAPTURE_STATE: break;
+    case FEEDBACK_COUNTS_PER_REVOLUTION: feature = AXIS_BUILT_ENCODER_CHECK_MASK; break;
     case FEEDBACK_COMPARE_START_LOW:
     case FEEDBACK_COMPARE_START_HIGH:
     case FEEDBACK_COMPARE_STEP_LOW:

@@ -48,7 +48,7 @@ static struct homing {
     bool up;       // direction of the search
     bool second;   // S3: the first side had no index
     uint32_t sampled_ms;
-    int64_t sampled;        // position at that time
+    int64_t sampled;        // position at that time, or at the last poll with a pressed switch
     int64_t zero_position;  // position that becomes the zero
     int32_t zero;           // position that the zero gets, in periods
     int32_t phase;          // of the position that was found, relative to the zero
@@ -201,7 +201,8 @@ static uint8_t opened(unsigned n) {
         arm(n, !at_high_end(n));
         return go(n, SEEK);
     }
-    h->zero_position = axis_read_position(n, AXIS_POSITION);
+    // The switch has opened between two polls: in the middle between their positions, on average.
+    h->zero_position = (h->sampled + axis_read_position(n, AXIS_POSITION)) >> 1;
     motion_controlled_stop(n);
     return go(n, RELEASE);
 }
@@ -245,6 +246,7 @@ uint8_t homing_poll(unsigned n, uint32_t state) {
                      BUS_PARAMETER_HOMING_LATCH_SPEED);  // bounced off
     case LEAVE:
         if (!home_pressed(n, state)) return opened(n);
+        h->sampled = axis_read_position(n, AXIS_POSITION);
         return motion_played(n) ? BUS_CAUSE_SWITCH_STUCK : BUS_CAUSE_RUNNING;
     case RELEASE: return motion_played(n) ? released(n) : BUS_CAUSE_RUNNING;
     case DEPART: return motion_played(n) ? go(n, FIRST_SETTLE) : BUS_CAUSE_RUNNING;

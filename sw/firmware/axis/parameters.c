@@ -10,6 +10,8 @@
 #define PULSES_AND_DIRECTION 3u  // mode of the decoder
 #define STEP_CYCLES_MASK ACTUATOR_STEP_PULSE_HIGH_MASK
 #define COEFFICIENTS 5u  // of a filter
+#define MOST_SAMPLES AXIS_SENSING_DEGLITCH_MASK
+#define FILTERS 2u  // with parameters
 
 #define LIMITS(name, id, low, high, value) [id] = {low, high, value},
 
@@ -70,17 +72,21 @@ static uint64_t cycles_of(int64_t nanoseconds) {
     return (uint64_t)nanoseconds * node_read(NODE_CLK_HZ) / 1000000000u;
 }
 
-// The deglitcher counts samples: one in each cycle, or one in skip + 1 cycles.
+// The deglitcher counts samples: one in each cycle, or one in skip + 1 cycles. A time that is
+// longer than it can count takes samples further apart.
 static void apply_sensing(unsigned axis) {
     const int64_t* p = parameters[axis];
+    uint64_t cycles = cycles_of(p[BUS_PARAMETER_DEGLITCH]);
     uint32_t skip = saturate(cycles_of(p[BUS_PARAMETER_FILTER_SKIP]), 0xFFFF);
-    uint64_t samples = (cycles_of(p[BUS_PARAMETER_DEGLITCH]) + skip) / (skip + 1u);
+    uint32_t least = (uint32_t)(cycles + MOST_SAMPLES - 1u) / MOST_SAMPLES;
+    if (skip + 1u < least) skip = least - 1u;
+    uint64_t samples = (cycles + skip) / (skip + 1u);
     feedback_write(
         axis, FEEDBACK_EDGE_FILTER,
         FIELD_PUT(FEEDBACK_EDGE_FILTER_SKIP, skip) |
             FIELD_PUT(FEEDBACK_EDGE_FILTER_TOLERATED, p[BUS_PARAMETER_FILTER_TOLERATED]));
     axis_write(axis, AXIS_SENSING,
-               FIELD_PUT(AXIS_SENSING_DEGLITCH, saturate(samples, 0xFFFF)) |
+               FIELD_PUT(AXIS_SENSING_DEGLITCH, samples) |
                    FIELD_PUT(AXIS_SENSING_OUTLIER_STEP, p[BUS_PARAMETER_OUTLIER_STEP]) |
                    FIELD_PUT(AXIS_SENSING_OUTLIER_HOLD, p[BUS_PARAMETER_OUTLIER_HOLD]));
 }
@@ -113,8 +119,8 @@ static void apply_steps(unsigned axis) {
         axis, ACTUATOR_STEP_OUTPUT,
         FIELD_PUT(ACTUATOR_STEP_OUTPUT_MODE, p[BUS_PARAMETER_STEP_OUTPUT]) |
             FIELD_PUT(ACTUATOR_STEP_OUTPUT_STEP_LOW, p[BUS_PARAMETER_STEP_INVERT]) |
-            FIELD_PUT(ACTUATOR_STEP_OUTPUT_DIRECTION_LOW, p[BUS_PARAMETER_STEP_INVERT] >> 1) |
-            FIELD_PUT(ACTUATOR_STEP_OUTPUT_TRIM, p[BUS_PARAMETER_STEP_TRIM]));
+            FIELD_PUT(ACTUATOR_STEP_OUTPUT_DIRECTION_LOW, p[BUS_PARAMETER_STEP_INVERT] >> 1));
+    actuator_write(axis, ACTUATOR_STEP_TRIM, 1u << p[BUS_PARAMETER_STEP_TRIM]);
     actuator_write_wide(axis, ACTUATOR_STEP_RATIO, (uint64_t)p[BUS_PARAMETER_STEPS_PER_PERIOD]);
 }
 
@@ -137,15 +143,21 @@ static void apply_watchdog(unsigned axis) {
     bus_write(BUS_WATCHDOG_TIME, (uint32_t)parameters[axis][BUS_PARAMETER_WATCHDOG_TIME]);
 }
 
-// A filter accepts coefficients only while it is not in use.
+static void write_filter(unsigned axis, uint32_t filter, uint32_t number, uint32_t value) {
+    axis_write(axis, AXIS_FILTER_ADDRESS, filter * 8 + number);
+    axis_write(axis, AXIS_FILTER_VALUE, value);
+}
+
+// The last value of a filter is whether it filters: not while its coefficients change.
 static void apply_filters(unsigned axis) {
     const int64_t* p = parameters[axis];
-    for (uint32_t n = 0; n < 2 * COEFFICIENTS; n++) {
-        uint32_t address = n / COEFFICIENTS * 8 + n % COEFFICIENTS;
-        axis_write(axis, AXIS_FILTERS, FIELD_PUT(AXIS_FILTERS_ADDRESS, address));
-        axis_write(axis, AXIS_FILTER_COEFFICIENT, (uint32_t)p[BUS_PARAMETER_FILTER_1_B0 + n]);
+    for (uint32_t filter = 0; filter < FILTERS; filter++) {
+        write_filter(axis, filter, COEFFICIENTS, 0);
+        for (uint32_t n = 0; n < COEFFICIENTS; n++)
+            write_filter(axis, filter, n,
+                         (uint32_t)p[BUS_PARAMETER_FILTER_1_B0 + filter * COEFFICIENTS + n]);
+        write_filter(axis, filter, COEFFICIENTS, (uint32_t)p[BUS_PARAMETER_FILTERS] >> filter & 1u);
     }
-    axis_write(axis, AXIS_FILTERS, FIELD_PUT(AXIS_FILTERS_IN_USE, p[BUS_PARAMETER_FILTERS]));
 }
 
 #define NUMBER(number, function) APPLY_##number,

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x8D3F3B1Eu    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x22265732u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -104,6 +104,8 @@ enum bus_fault {    // bits
     BUS_FAULT_PROFILE_UNDERRUN = 1 << 8,    // the profile ran out of segments
     // too many steps are pending: too fast for the step timing, or blocked
     BUS_FAULT_STEP_OVERRUN = 1 << 9,
+    // a servo tick came before the motion engine had served the last one
+    BUS_FAULT_SERVO_OVERRUN = 1 << 10,
 };
 
 enum bus_encoder_event {    // bits
@@ -341,7 +343,8 @@ enum bus_job_flag {    // bits
     X(6, "the drive reports a fault") \
     X(7, "the soft core stopped or hangs") \
     X(8, "the profile ran out of segments") \
-    X(9, "too many steps are pending")
+    X(9, "too many steps are pending") \
+    X(10, "a servo tick came before the motion engine had served the last one")
 
 // X(code, words), up to a colon
 #define BUS_JOB_STATE_WORDS(X) \
@@ -1127,15 +1130,15 @@ enum bus_parameter {
     X(AMPLITUDE_HIGH, AXIS, AMPLITUDE_WINDOW, AMPLITUDE_WINDOW_HIGH) \
     X(DISAGREEMENT_LIMIT, AXIS, DISAGREEMENT_LIMIT, DISAGREEMENT_LIMIT) \
     X(ENCODER_FAULT_MASK, AXIS, ENCODER_FAULT_MASK, ENCODER_FAULT_MASK) \
+    X(INTEGRAL_LIMIT, AXIS, INTEGRAL_LIMIT, INTEGRAL_LIMIT) \
     X(KP, AXIS, KP, KP) \
     X(KI, AXIS, KI, KI) \
     X(KD, AXIS, KD, KD) \
     X(KV, AXIS, KV, KV) \
     X(KA, AXIS, KA, KA) \
-    X(OUTPUT_LIMIT, AXIS, SERVO_LIMITS, SERVO_LIMITS_OUTPUT) \
-    X(INTEGRAL_LIMIT, AXIS, SERVO_LIMITS, SERVO_LIMITS_INTEGRAL) \
+    X(OUTPUT_LIMIT, AXIS, OUTPUT_LIMIT, OUTPUT_LIMIT) \
     X(DEAD_BAND, AXIS, DEAD_BAND, DEAD_BAND) \
-    X(FEED_OVERRIDE, AXIS, FEED_OVERRIDE, FEED_OVERRIDE_FRACTION) \
+    X(FEED_OVERRIDE, AXIS, FEED_OVERRIDE, FEED_OVERRIDE) \
     X(SIGNAL_FAULT_MASK, FEEDBACK, SIGNAL_FAULT_MASK, SIGNAL_FAULT_MASK) \
     X(SIGNAL_CLIP_LEVEL, FEEDBACK, LISSAJOUS_LIMITS, LISSAJOUS_LIMITS_CLIP_LEVEL) \
     X(SIGNAL_TOLERANCE, FEEDBACK, LISSAJOUS_LIMITS, LISSAJOUS_LIMITS_TOLERANCE) \

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x2c7f6456u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x1698ddeau  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -652,16 +652,19 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_FAULTS_STEP_OVERRUN_MASK 0x00000200u
 #define AXIS_FAULTS_STEP_OVERRUN_SHIFT 9
 #define AXIS_FAULTS_STEP_OVERRUN_WIDTH 1
+#define AXIS_FAULTS_SERVO_OVERRUN_MASK 0x00000400u
+#define AXIS_FAULTS_SERVO_OVERRUN_SHIFT 10
+#define AXIS_FAULTS_SERVO_OVERRUN_WIDTH 1
 // r: causes present now, same bits as faults
 #define AXIS_CAUSES_NOW 0x010u
-#define AXIS_CAUSES_NOW_MASK 0x000003ffu
+#define AXIS_CAUSES_NOW_MASK 0x000007ffu
 #define AXIS_CAUSES_NOW_SHIFT 0
-#define AXIS_CAUSES_NOW_WIDTH 10
+#define AXIS_CAUSES_NOW_WIDTH 11
 // r: cause that came first, same bits as faults; one bit
 #define AXIS_FIRST_FAULT 0x014u
-#define AXIS_FIRST_FAULT_MASK 0x000003ffu
+#define AXIS_FIRST_FAULT_MASK 0x000007ffu
 #define AXIS_FIRST_FAULT_SHIFT 0
-#define AXIS_FIRST_FAULT_WIDTH 10
+#define AXIS_FIRST_FAULT_WIDTH 11
 // r: position when the first fault was latched [1/65536 period]
 #define AXIS_FAULT_POSITION 0x018u
 #define AXIS_FAULT_POSITION_LOW 0x018u
@@ -705,10 +708,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_ZERO_CROSSING_DOWN_WIDTH 1
 // rw: settings of the input filters
 #define AXIS_SENSING 0x044u
-// time that a, b and z must be stable [cycle]
-#define AXIS_SENSING_DEGLITCH_MASK 0x0000ffffu
+// samples in a row that a, b and z must have the same level; one in each edge_filter.skip + 1
+// cycles [sample]
+#define AXIS_SENSING_DEGLITCH_MASK 0x0000003fu
 #define AXIS_SENSING_DEGLITCH_SHIFT 0
-#define AXIS_SENSING_DEGLITCH_WIDTH 16
+#define AXIS_SENSING_DEGLITCH_WIDTH 6
 // outlier filter: largest step between two samples, full scale 2^(W-1); 0: off
 #define AXIS_SENSING_OUTLIER_STEP_MASK 0x00ff0000u
 #define AXIS_SENSING_OUTLIER_STEP_SHIFT 16
@@ -783,16 +787,17 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_ENCODER_FAULT_MASK_MASK 0x0000003fu
 #define AXIS_ENCODER_FAULT_MASK_SHIFT 0
 #define AXIS_ENCODER_FAULT_MASK_WIDTH 6
-// rw: pulses of a, b or z that the filter rejected; writing clears the count
+// rw: pulses of a, b or z that the filter rejected; writing clears the count, which stops at its
+// largest value
 #define AXIS_REJECTED_PULSES 0x064u
-#define AXIS_REJECTED_PULSES_MASK 0xffffffffu
+#define AXIS_REJECTED_PULSES_MASK 0x0000ffffu
 #define AXIS_REJECTED_PULSES_SHIFT 0
-#define AXIS_REJECTED_PULSES_WIDTH 32
+#define AXIS_REJECTED_PULSES_WIDTH 16
 // rw: samples that the outlier filter rejected; writing clears the count
 #define AXIS_REJECTED_SAMPLES 0x068u
-#define AXIS_REJECTED_SAMPLES_MASK 0xffffffffu
+#define AXIS_REJECTED_SAMPLES_MASK 0x0000ffffu
 #define AXIS_REJECTED_SAMPLES_SHIFT 0
-#define AXIS_REJECTED_SAMPLES_WIDTH 32
+#define AXIS_REJECTED_SAMPLES_WIDTH 16
 // r: what is built; 1: the axis has it
 #define AXIS_BUILT 0x06cu
 // HAS_SINE: sine and cosine; 0: the position is made of counts
@@ -819,38 +824,47 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_BUILT_COMPARE_MASK 0x00000020u
 #define AXIS_BUILT_COMPARE_SHIFT 5
 #define AXIS_BUILT_COMPARE_WIDTH 1
-// HAS_VELOCITY: velocity estimator
-#define AXIS_BUILT_VELOCITY_MASK 0x00000040u
-#define AXIS_BUILT_VELOCITY_SHIFT 6
+// HAS_ENCODER_CHECK: check of counts per revolution, count at the index, time of the last edge
+#define AXIS_BUILT_ENCODER_CHECK_MASK 0x00000040u
+#define AXIS_BUILT_ENCODER_CHECK_SHIFT 6
+#define AXIS_BUILT_ENCODER_CHECK_WIDTH 1
+// HAS_VELOCITY: measured velocity
+#define AXIS_BUILT_VELOCITY_MASK 0x00000080u
+#define AXIS_BUILT_VELOCITY_SHIFT 7
 #define AXIS_BUILT_VELOCITY_WIDTH 1
 // HAS_DRIVE: profile, servo, interlock; 0: the axis only measures
-#define AXIS_BUILT_DRIVE_MASK 0x00000080u
-#define AXIS_BUILT_DRIVE_SHIFT 7
+#define AXIS_BUILT_DRIVE_MASK 0x00000100u
+#define AXIS_BUILT_DRIVE_SHIFT 8
 #define AXIS_BUILT_DRIVE_WIDTH 1
 // HAS_BRIDGE: bridge
-#define AXIS_BUILT_BRIDGE_MASK 0x00000100u
-#define AXIS_BUILT_BRIDGE_SHIFT 8
+#define AXIS_BUILT_BRIDGE_MASK 0x00000200u
+#define AXIS_BUILT_BRIDGE_SHIFT 9
 #define AXIS_BUILT_BRIDGE_WIDTH 1
 // HAS_STEPPER: step generator
-#define AXIS_BUILT_STEPPER_MASK 0x00000200u
-#define AXIS_BUILT_STEPPER_SHIFT 9
+#define AXIS_BUILT_STEPPER_MASK 0x00000400u
+#define AXIS_BUILT_STEPPER_SHIFT 10
 #define AXIS_BUILT_STEPPER_WIDTH 1
 // HAS_DAC: DAC
-#define AXIS_BUILT_DAC_MASK 0x00000400u
-#define AXIS_BUILT_DAC_SHIFT 10
+#define AXIS_BUILT_DAC_MASK 0x00000800u
+#define AXIS_BUILT_DAC_SHIFT 11
 #define AXIS_BUILT_DAC_WIDTH 1
 // HAS_FINE_STAGE: fine stage
-#define AXIS_BUILT_FINE_STAGE_MASK 0x00000800u
-#define AXIS_BUILT_FINE_STAGE_SHIFT 11
+#define AXIS_BUILT_FINE_STAGE_MASK 0x00001000u
+#define AXIS_BUILT_FINE_STAGE_SHIFT 12
 #define AXIS_BUILT_FINE_STAGE_WIDTH 1
 // FILTERS: biquads of the servo; 0: none
-#define AXIS_BUILT_FILTERS_MASK 0x00007000u
-#define AXIS_BUILT_FILTERS_SHIFT 12
+#define AXIS_BUILT_FILTERS_MASK 0x0000e000u
+#define AXIS_BUILT_FILTERS_SHIFT 13
 #define AXIS_BUILT_FILTERS_WIDTH 3
 // SEGMENTS: most segments of the table; 0: none
-#define AXIS_BUILT_SEGMENTS_MASK 0x007f8000u
-#define AXIS_BUILT_SEGMENTS_SHIFT 15
+#define AXIS_BUILT_SEGMENTS_MASK 0x00ff0000u
+#define AXIS_BUILT_SEGMENTS_SHIFT 16
 #define AXIS_BUILT_SEGMENTS_WIDTH 8
+// rw: largest |integral term|; full scale 2^15
+#define AXIS_INTEGRAL_LIMIT 0x070u
+#define AXIS_INTEGRAL_LIMIT_MASK 0x00007fffu
+#define AXIS_INTEGRAL_LIMIT_SHIFT 0
+#define AXIS_INTEGRAL_LIMIT_WIDTH 15
 // rw: proportional gain on the error [1/65536 command/(period/65536)]
 #define AXIS_KP 0x080u
 #define AXIS_KP_MASK 0x00ffffffu
@@ -876,16 +890,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_KA_MASK 0x00ffffffu
 #define AXIS_KA_SHIFT 0
 #define AXIS_KA_WIDTH 24
-// rw: limits of the servo; full scale 2^15
-#define AXIS_SERVO_LIMITS 0x094u
-// largest |command|
-#define AXIS_SERVO_LIMITS_OUTPUT_MASK 0x00007fffu
-#define AXIS_SERVO_LIMITS_OUTPUT_SHIFT 0
-#define AXIS_SERVO_LIMITS_OUTPUT_WIDTH 15
-// largest |integral term|
-#define AXIS_SERVO_LIMITS_INTEGRAL_MASK 0x3fff8000u
-#define AXIS_SERVO_LIMITS_INTEGRAL_SHIFT 15
-#define AXIS_SERVO_LIMITS_INTEGRAL_WIDTH 15
+// rw: largest |command|; full scale 2^15
+#define AXIS_OUTPUT_LIMIT 0x094u
+#define AXIS_OUTPUT_LIMIT_MASK 0x00007fffu
+#define AXIS_OUTPUT_LIMIT_SHIFT 0
+#define AXIS_OUTPUT_LIMIT_WIDTH 15
 // rw: dead band: the integrator holds while |error| is not above this and no profile is played
 // [1/65536 period]
 #define AXIS_DEAD_BAND 0x098u
@@ -907,21 +916,17 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_OPEN_COMMAND_MASK 0x0000ffffu
 #define AXIS_OPEN_COMMAND_SHIFT 0
 #define AXIS_OPEN_COMMAND_WIDTH 16
-// rw: filters of the servo; a section takes new coefficients only while it is not in use
-#define AXIS_FILTERS 0x0a8u
-// bit n: section n filters; else it passes its input
-#define AXIS_FILTERS_IN_USE_MASK 0x0000000fu
-#define AXIS_FILTERS_IN_USE_SHIFT 0
-#define AXIS_FILTERS_IN_USE_WIDTH 4
-// section * 8 + coefficient; 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
-#define AXIS_FILTERS_ADDRESS_MASK 0x000001f0u
-#define AXIS_FILTERS_ADDRESS_SHIFT 4
-#define AXIS_FILTERS_ADDRESS_WIDTH 5
-// rw: coefficient; writing stores it at filters.address
-#define AXIS_FILTER_COEFFICIENT 0x0acu
-#define AXIS_FILTER_COEFFICIENT_MASK 0xffffffffu
-#define AXIS_FILTER_COEFFICIENT_SHIFT 0
-#define AXIS_FILTER_COEFFICIENT_WIDTH 32
+// rw: number of a value of a filter: filter * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2, 5: whether
+// it filters, 0: no
+#define AXIS_FILTER_ADDRESS 0x0a8u
+#define AXIS_FILTER_ADDRESS_MASK 0x0000001fu
+#define AXIS_FILTER_ADDRESS_SHIFT 0
+#define AXIS_FILTER_ADDRESS_WIDTH 5
+// rw: value of a filter; writing stores it at filter_address
+#define AXIS_FILTER_VALUE 0x0acu
+#define AXIS_FILTER_VALUE_MASK 0xffffffffu
+#define AXIS_FILTER_VALUE_SHIFT 0
+#define AXIS_FILTER_VALUE_WIDTH 32
 // rw: velocity at the start of the segment [2^-40 period/tick]
 #define AXIS_SEGMENT_VELOCITY 0x0b0u
 #define AXIS_SEGMENT_VELOCITY_LOW 0x0b0u
@@ -956,16 +961,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_STOP_JERK_MASK 0xffffffffu
 #define AXIS_STOP_JERK_SHIFT 0
 #define AXIS_STOP_JERK_WIDTH 32
-// rw: feed override: the speed at which profiles are played
+// rw: feed override: fraction of full speed, 65536 at most, at which profiles are played; 0: pause
 #define AXIS_FEED_OVERRIDE 0x0d0u
-// fraction of full speed, 65536 at most
-#define AXIS_FEED_OVERRIDE_FRACTION_MASK 0x0001ffffu
-#define AXIS_FEED_OVERRIDE_FRACTION_SHIFT 0
-#define AXIS_FEED_OVERRIDE_FRACTION_WIDTH 17
-// 1: pause inside the profile
-#define AXIS_FEED_OVERRIDE_PAUSE_MASK 0x00020000u
-#define AXIS_FEED_OVERRIDE_PAUSE_SHIFT 17
-#define AXIS_FEED_OVERRIDE_PAUSE_WIDTH 1
+#define AXIS_FEED_OVERRIDE_MASK 0x0001ffffu
+#define AXIS_FEED_OVERRIDE_SHIFT 0
+#define AXIS_FEED_OVERRIDE_WIDTH 17
 // rw: largest change of the override; 0: not limited [2^-32 1/tick]
 #define AXIS_FEED_OVERRIDE_SLOPE 0x0d4u
 #define AXIS_FEED_OVERRIDE_SLOPE_MASK 0xffffffffu
@@ -1289,11 +1289,6 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_VELOCITY_QUANTUM_MASK 0x0000ffffu
 #define FEEDBACK_VELOCITY_QUANTUM_SHIFT 0
 #define FEEDBACK_VELOCITY_QUANTUM_WIDTH 16
-// r: velocity with all its bits [2^-24 period/tick]
-#define FEEDBACK_VELOCITY_FINE 0x0a0u
-#define FEEDBACK_VELOCITY_FINE_LOW 0x0a0u
-#define FEEDBACK_VELOCITY_FINE_HIGH 0x0a4u
-#define FEEDBACK_VELOCITY_FINE_WIDTH 40
 // rw: what the position is made of
 #define FEEDBACK_POSITION_SOURCE 0x0a8u
 // 1: counts of a and b, 0: phases, if sine and cosine are built; a count is a quarter period
@@ -1413,10 +1408,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_MASK 0x00000008u
 #define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_SHIFT 3
 #define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_WIDTH 1
-// shift of the command: it moves the target by command * 2^trim LSB of position
-#define ACTUATOR_STEP_OUTPUT_TRIM_MASK 0x000000f0u
-#define ACTUATOR_STEP_OUTPUT_TRIM_SHIFT 4
-#define ACTUATOR_STEP_OUTPUT_TRIM_WIDTH 4
+// rw: motion of the target for one count of the command [1/65536 period]
+#define ACTUATOR_STEP_TRIM 0x014u
+#define ACTUATOR_STEP_TRIM_MASK 0x0000ffffu
+#define ACTUATOR_STEP_TRIM_SHIFT 0
+#define ACTUATOR_STEP_TRIM_WIDTH 16
 // rw: steps in one period; a negative sign reverses the direction [2^-32 step/period]
 #define ACTUATOR_STEP_RATIO 0x018u
 #define ACTUATOR_STEP_RATIO_LOW 0x018u

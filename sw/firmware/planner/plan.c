@@ -40,11 +40,17 @@ void plan_add(struct plan* plan, uint32_t tick, struct planner_event event) {
 void plan_advance(struct planner_progress* at, uint32_t ticks) {
     struct planner_state* s = &at->state;
     int64_t jerk = at->jerk + at->landing;
+    at->tick += ticks;
+    if (ticks == 1) {  // most pieces of a short motion: without the products
+        s->moved += (uint64_t)s->velocity;
+        s->velocity += s->acceleration;
+        s->acceleration += jerk;
+        return;
+    }
     s->moved += (uint64_t)s->velocity * ticks + (uint64_t)s->acceleration * pairs(ticks) +
                 (uint64_t)jerk * triples(ticks);
     s->velocity += (int64_t)((uint64_t)s->acceleration * ticks + (uint64_t)jerk * pairs(ticks));
     s->acceleration += jerk * ticks;
-    at->tick += ticks;
 }
 
 // Adds the events of the instant at which `at` is; `at` may be a copy of the progress of the plan.
@@ -93,7 +99,35 @@ bool plan_walk(const struct plan* plan, struct planner_progress* at, uint8_t* ne
     return true;
 }
 
+// The velocity of the tick that follows a progress.
+static int64_t velocity_at(const struct plan* plan, const struct planner_progress* at,
+                           uint8_t next) {
+    int64_t velocity = at->state.velocity;
+    for (; next < plan->count && plan->event[next].tick == at->tick; next++)
+        velocity += plan->event[next].velocity;
+    return velocity;
+}
+
+// Joins the next tick to a segment of one tick, if the jerk fits into 32 bits.
+static void join(struct plan* plan, struct planner_segment* piece, bool* last) {
+    struct planner_progress at = plan->at;
+    uint8_t next = plan->next;
+    struct planner_segment tick;
+    bool ends;
+    plan_walk(plan, &at, &next, &tick, &ends, 1);
+    const int64_t acceleration = tick.velocity - piece->velocity,
+                  after = ends ? tick.acceleration : velocity_at(plan, &at, next) - tick.velocity,
+                  jerk = after - acceleration;
+    if ((int32_t)jerk != jerk) return;
+    *piece = (struct planner_segment){piece->velocity, acceleration, (int32_t)jerk, 2};
+    plan->at = at;
+    plan->next = next;
+    *last = ends;
+}
+
 bool planner_take_up_to(struct plan* plan, struct planner_segment* piece, bool* last,
                         uint32_t longest) {
-    return plan_walk(plan, &plan->at, &plan->next, piece, last, longest);
+    if (!plan_walk(plan, &plan->at, &plan->next, piece, last, longest)) return false;
+    if (!plan->stepped && !*last && piece->ticks == 1 && longest > 1) join(plan, piece, last);
+    return true;
 }

@@ -20,6 +20,11 @@ bool plan_walk(const struct plan* plan, struct planner_progress* at, uint8_t* ne
 
 // Takes the next segment for the queue of the player, of at most `longest` ticks. *last: the plan
 // ends with it. Returns false when nothing is left.
+// Events may be a tick apart, but the queue of the player holds few segments. So a segment of one
+// tick is joined to the next tick. Velocity, acceleration and jerk give the velocities of both and
+// of the tick after them, so this is exact, and the acceleration continues as without it. Only
+// these are shorter: the last segment, one whose jerk does not fit into 32 bits, and those of a
+// stepped profile.
 bool planner_take_up_to(struct plan* plan, struct planner_segment* piece, bool* last,
                         uint32_t longest);
 

@@ -11,7 +11,7 @@
 
 #define PLANNER_EVENTS 60u   // instants at which a motion changes; 57 at most
 #define PLANNER_SECTIONS 9u  // of a stepped profile: a tick at rest, 3 up, 2 at the top, 3 down
-#define PLANNER_LONGEST_PIECE 0x800000u  // ticks in one segment; profile_player has 24 bits
+#define PLANNER_LONGEST_PIECE 0x800000u  // ticks in one segment; the motion engine has 24 bits
 
 enum planner_cause {
     PLANNER_OK,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// planner -- plans a motion as segments of constant jerk for profile_player. It ends exactly at the
-// target and stays inside its limits.
+// planner -- plans a motion as segments of constant jerk for the motion engine. It ends exactly at
+// the target and stays inside its limits.
 //
 // The functions use no hardware, no state and no floating point. planner.c has the limits and the
 // motions from rest to rest, retarget.c the change of target in flight, plan.c the list of events.

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The firmware as a shared library of this computer, its registers served by Python."""
 
+import _ctypes
 import ctypes
+import shutil
+import tempfile
+import weakref
 from functools import cache
 from pathlib import Path
 
 from firmware import build as firmware_build
-from twin.compiled.host_library import host_library
+from twin.compiled.host_library import host_library_file
 
 BRIDGE = Path(__file__).with_name("register_bridge.c")
 EVENTS, SECTIONS = 60, 9
@@ -103,13 +107,35 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 
 
 @cache
-def library(image: str = "axis") -> ctypes.CDLL:
-    """The firmware of an image. Its state is one for all FakeNode objects of that image: starting
-    one resets it.
-    """
+def build(image: str) -> Path:
+    """Build the firmware of an image as a shared library; returns its file."""
     sources = [path for path in firmware_build.sources_of(image) if path.suffix == ".c"]
     options = ["-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(image)]
-    loaded = host_library(f"firmware_{image}", [*sources, BRIDGE], options)
+    return host_library_file(f"firmware_{image}", [*sources, BRIDGE], options)
+
+
+@cache
+def library(image: str = "axis") -> ctypes.CDLL:
+    """The functions of an image that have no state, such as those of the planner."""
+    return load(build(image))
+
+
+def power_up(image: str, node: object) -> ctypes.CDLL:
+    """A firmware with a memory of its own, as after power-up, until the node has gone. The loader
+    loads a file only once, so that each firmware is a copy of the file.
+    """
+    file = build(image)
+    with tempfile.TemporaryDirectory(dir=file.parent) as directory:
+        loaded = load(Path(shutil.copy(file, directory)))
+    weakref.finalize(node, _ctypes.dlclose, loaded._handle)
+    return loaded
+
+
+def load(file: Path) -> ctypes.CDLL:
+    """Load a file that build() has made."""
+    loaded = ctypes.CDLL(str(file))
+    loaded.parameters_get.restype = ctypes.c_int64
+    loaded.parameters_set.argtypes = [ctypes.c_uint, ctypes.c_uint8, ctypes.c_int64]
     loaded.planner_limits.restype = Limits
     loaded.planner_move.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
     loaded.planner_retarget.argtypes = [

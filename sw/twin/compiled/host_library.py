@@ -38,8 +38,13 @@ def compiler() -> list[str]:
 
 
 def host_library(name: str, sources: Sequence[Path], options: Sequence[str] = ()) -> ctypes.CDLL:
-    """Load build/firmware/host_NAME.so, compiled again if a source or any header of the firmware is
-    newer. Raises CalledProcessError if the compiler refuses a source.
+    """Load the file of host_library_file()."""
+    return ctypes.CDLL(str(host_library_file(name, sources, options)))
+
+
+def host_library_file(name: str, sources: Sequence[Path], options: Sequence[str] = ()) -> Path:
+    """Build build/firmware/host_NAME.so, compiled again if a source or any header of the firmware
+    is newer; returns it. Raises CalledProcessError if the compiler refuses a source.
     """
     library = ROOT / "build" / "firmware" / f"host_{name}.so"
     newest = max(path.stat().st_mtime for path in (*sources, *FIRMWARE.rglob("*.h")))
@@ -51,4 +56,4 @@ def host_library(name: str, sources: Sequence[Path], options: Sequence[str] = ()
             files = [str(path) for path in sources]
             subprocess.run([*compiler(), *OPTIONS, *options, *files, "-o", str(made)], check=True)
             os.replace(made, library)
-    return ctypes.CDLL(str(library))
+    return library

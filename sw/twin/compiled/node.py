@@ -2,12 +2,13 @@
 """A node without hardware: the compiled firmware, and in place of its registers a bus, a clock and
 simple axes in Python.
 
-The player adds up the segments as they were pushed: without B-spline between their steps, feed
-override or limit of jerk. A controlled stop takes stop_deceleration off the velocity each tick, and
-a profile starts at full speed. What rtl/control/profile_player.sv does beyond this is tested with
-its own model, and with the RTL in tb/system. Each tick the position moves by half the distance to
-the target; an axis whose drive is off does not move, and it slides a little past a limit switch
-that has closed. Faults latch as drive_interlock does it.
+The player adds up the segments as they were pushed: without B-spline between their steps or limit
+of jerk. A feed override leaves out ticks, and changes at once. A controlled stop takes
+stop_deceleration off the velocity each tick, and a profile starts at full speed. What
+rtl/control/motion_engine.sv does beyond this is tested with its own model, and with the RTL in
+tb/system. Each tick the position moves by half the distance to the target; an axis whose drive is
+off does not move, and it slides a little past a limit switch that has closed. Faults latch as
+drive_interlock does it.
 """
 
 import re
@@ -18,7 +19,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
 from twin.build import FIRMWARE, ROOT
-from twin.compiled.firmware import READ, WRITE, library
+from twin.compiled.firmware import READ, WRITE, power_up
 
 DEFINES = {
     name: int(value.rstrip("u"), 0)
@@ -36,8 +37,10 @@ FLAG = {name: 1 << bit for name, (bit, _) in TABLE["flag"].items()}
 PARAMETER = TABLE["parameter"]
 CLK_HZ = 4_000_000
 PERIOD = 65536
+FULL_SPEED = 1 << 16  # of the feed override
 SLIDE = 30 * PERIOD  # past a closed switch
 BACKLASH = PERIOD // 2  # a switch opens so far from where it closed
+INDEX, SOFTWARE = 1 << 0, 1 << 2  # bits of capture_sources
 ALWAYS_LATCHED = FAULT["estop"] | FAULT["drive"] | FAULT["cpu"]
 
 
@@ -136,6 +139,7 @@ class Axis:
         self.stuck_low = False
         self.player = Player()
         self.player.target = position << 24
+        self.progress = 0  # of the player within a tick, 2^-16
         self.faults = self.first_fault = self.fault_position = 0
         self.causes = 0  # those that the test sets
         self.enabled = self.seized = False
@@ -173,7 +177,8 @@ class Axis:
                 FAULT["limit_low"] * self.pressed_low | FAULT["limit_high"] * self.pressed_high
             )
         limit = self.word.get(DEFINES["AXIS_FOLLOWING_LIMIT"], 0)
-        if self.enabled and limit and abs(self.error) > limit:
+        loops = DEFINES["AXIS_CONTROL_CLOSED_LOOP_MASK"] | DEFINES["AXIS_CONTROL_FINE_MASK"]
+        if self.enabled and self.control & loops and limit and abs(self.error) > limit:
             causes |= FAULT["following_error"]
         enable = self.control & DEFINES["AXIS_CONTROL_ENABLE_MASK"]
         arrived = causes & (-1 if enable else ALWAYS_LATCHED)
@@ -192,7 +197,12 @@ class Axis:
 
     def tick(self) -> None:
         """One servo tick of player, drive and switches."""
-        underrun = self.player.tick()
+        override = self.word.get(DEFINES["AXIS_FEED_OVERRIDE"], FULL_SPEED)
+        self.progress += FULL_SPEED if self.player.braking else override
+        underrun = False
+        if self.progress >= FULL_SPEED:
+            self.progress -= FULL_SPEED
+            underrun = self.player.tick()
         old = self.machine
         if self.enabled and not self.seized:
             step = (
@@ -299,7 +309,7 @@ class Axis:
             self.pushed.append(segment)
 
 
-class FakeFeedbackChannel:
+class FeedbackChannel:
     """The registers of a feedback channel. `burst(phases, every)` gives the 1024 words of a burst,
     which is full after `delay` polls.
     """
@@ -316,16 +326,23 @@ class FakeFeedbackChannel:
         self.written: dict[int, int] = {}  # the table that is being written
         self.correction: dict[str, int] | None = None
         self.loads = 0
-        self.captured: int | None = None
+        # waiting captures, oldest first: the register `captured`, cycle, 2^-16 period
+        self.captures: deque[tuple[int, int, int]] = deque()
         self.armed, self.latch = False, 0
         self.segments: dict[int, int] = {}
         self.use: dict[str, Any] | None = None  # the settings in force
         self.uses: list[bool | None] = []  # whether linear, of each use; None: out of force
 
-    def index(self, position: int) -> None:
+    def capture(self, source: int, clk: int, position: int) -> None:
+        """An event of this bit of capture_sources, which is captured if that is selected."""
+        if self.word.get(DEFINES["FEEDBACK_CAPTURE_SOURCES"], 0) & source:
+            self.captures.append((source, clk, position))
+
+    def index(self, clk: int, position: int) -> None:
         """An index mark passes at a position."""
-        if self.armed and self.word.get(DEFINES["FEEDBACK_CAPTURE_SOURCES"], 0) & 1:
-            self.armed, self.captured = False, position
+        if self.armed:
+            self.armed = False
+            self.capture(INDEX, clk, position)
 
     def read(self, offset: int) -> int:
         """A register of the feedback block."""
@@ -339,10 +356,15 @@ class FakeFeedbackChannel:
             self.taken += 1
             return self.words[(self.taken - 1) % len(self.words)]
         if offset == d["FEEDBACK_CAPTURE_STATE"]:
-            return d["FEEDBACK_CAPTURE_STATE_PRESENT_MASK"] * (self.captured is not None)
-        if offset == d["FEEDBACK_CAPTURED_POSITION"] and self.captured is not None:
-            self.latch = self.captured >> 32 & 0xFFFF
-            return self.captured & 0xFFFFFFFF
+            present = d["FEEDBACK_CAPTURE_STATE_PRESENT_MASK"] * bool(self.captures)
+            return present | self.word.get(offset, 0)
+        if offset == d["FEEDBACK_CAPTURED"] and self.captures:
+            return self.captures[0][0]
+        if offset == d["FEEDBACK_CAPTURED_TIME"] and self.captures:
+            return self.captures[0][1] & 0xFFFFFFFF
+        if offset == d["FEEDBACK_CAPTURED_POSITION"] and self.captures:
+            self.latch = self.captures[0][2] >> 32 & 0xFFFF
+            return self.captures[0][2] & 0xFFFFFFFF
         if offset == d["FEEDBACK_CAPTURED_POSITION"] + 4:
             return self.latch
         if offset == d["FEEDBACK_SEGMENT_STATE"]:
@@ -379,6 +401,9 @@ class FakeFeedbackChannel:
     def write(self, offset: int, value: int) -> None:
         """Write a register of the feedback block."""
         d = DEFINES
+        if offset in (d["FEEDBACK_CAPTURE_STATE"], d["FEEDBACK_COMPARE_STATE"]):
+            self.word[offset] = self.word.get(offset, 0) & ~value  # writing 1 clears a bit
+            return
         self.word[offset] = value
         if offset == d["FEEDBACK_SEGMENT_POINT"]:
             self.segments[value >> 24] = signed(value & 0xFFFFFF, 24)
@@ -390,7 +415,9 @@ class FakeFeedbackChannel:
             self.strobes.append(value)
             self.armed = self.armed or bool(value & d["FEEDBACK_STROBES_ARM_INDEX_MASK"])
             if value & d["FEEDBACK_STROBES_CAPTURE_CLEAR_MASK"]:
-                self.captured = None
+                self.captures.clear()
+            if value & d["FEEDBACK_STROBES_CAPTURE_NEXT_MASK"] and self.captures:
+                self.captures.popleft()
             if value & d["FEEDBACK_STROBES_RECORD_MASK"]:
                 setting = self.word[d["FEEDBACK_RECORDER"]]
                 self.records.append((bool(setting >> 16 & 1), setting & 0xFFFF))
@@ -420,11 +447,11 @@ class Peripherals(Protocol):
     def write(self, offset: int, value: int) -> None:
         """Write a register of the block."""
 
-    def millisecond(self, machine: "FakeNode") -> None:
+    def millisecond(self, machine: "CompiledNode") -> None:
         """A millisecond of the node has passed."""
 
 
-class FakeNode:
+class CompiledNode:
     """The compiled firmware with its registers in Python; request() talks to it as a host does."""
 
     def __init__(
@@ -452,7 +479,7 @@ class FakeNode:
         )
         for name in absent:
             self.built &= ~DEFINES[f"AXIS_BUILT_{name.upper()}_MASK"]
-        self.feedback_channels = [FakeFeedbackChannel() for _ in self.axes]
+        self.feedback_channels = [FeedbackChannel() for _ in self.axes]
         self.actuators: list[dict[int, int]] = [{} for _ in self.axes]  # words by their offset
         self.peripherals = peripherals
         self.received: deque[int] = deque()
@@ -464,7 +491,7 @@ class FakeNode:
             READ(self.read),
             WRITE(self.write),
         )  # kept alive as long as the firmware may call
-        self.firmware = library(image)
+        self.firmware = power_up(image, self)
         self.firmware.register_bridge(*self.answers)
         self.firmware.firmware_start()
 
@@ -502,7 +529,8 @@ class FakeNode:
             d["NODE_MAP_CRC"]: self.map_crc,
             d["NODE_CLK_HZ"]: CLK_HZ,
             d["NODE_BUILD"]: build,
-            d["NODE_TIME_STAMP"]: self.clk & 0xFFFFFFFF,
+            d["NODE_TIME_STAMP_LOW"]: self.clk & 0xFFFFFFFF,
+            d["NODE_TIME_STAMP_HIGH"]: self.clk >> 32,
         }.get(offset, self.word.get(offset, 0))
 
     def write(self, offset: int, value: int) -> None:
@@ -514,9 +542,12 @@ class FakeNode:
             ] = value
         elif offset >= d["FEEDBACK_BASE"]:
             axis = (offset - d["FEEDBACK_BASE"]) // d["FEEDBACK_STRIDE"]
-            self.feedback_channels[axis].write(offset % d["FEEDBACK_STRIDE"], value)
-            if offset % d["FEEDBACK_STRIDE"] == d["FEEDBACK_ALIGN"]:
+            offset %= d["FEEDBACK_STRIDE"]
+            self.feedback_channels[axis].write(offset, value)
+            if offset == d["FEEDBACK_ALIGN"]:
                 self.axes[axis].origin += signed(value & 7, 3) * (PERIOD // 4)
+            if offset == d["FEEDBACK_STROBES"] and value & d["FEEDBACK_STROBES_CAPTURE_NOW_MASK"]:
+                self.feedback_channels[axis].capture(SOFTWARE, self.clk, self.axes[axis].position)
         elif offset >= d["AXIS_BASE"]:
             self.axes[(offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]].write(
                 offset % d["AXIS_STRIDE"], value
@@ -533,8 +564,22 @@ class FakeNode:
         else:
             self.word[offset] = value
             if offset == d["NODE_START_AXES"]:
-                for n, started in enumerate(self.axes):
-                    started.player.moving |= bool(value >> n & 1 and started.player.queue)
+                self.start_axes(value)
+
+    def start_axes(self, mask: int) -> None:
+        """Start the segments that wait in the players of these axes (bit n: axis n)."""
+        for n, axis in enumerate(self.axes):
+            axis.player.moving |= bool(mask >> n & 1 and axis.player.queue)
+
+    def sync(self) -> None:
+        """The sync pulse of the bus: prepared axes start, positions are captured."""
+        d = DEFINES
+        self.word[d["BUS_BASE"] + d["BUS_SYNCS"]] = 1 + self.word.get(
+            d["BUS_BASE"] + d["BUS_SYNCS"], 0
+        )
+        self.start_axes(self.word.get(d["BUS_BASE"] + d["BUS_SYNC_AXES"], 0))
+        for axis, channel in zip(self.axes, self.feedback_channels, strict=True):
+            channel.capture(SOFTWARE, self.clk, axis.position)
 
     def poll(self, times: int = 1) -> None:
         """Poll the firmware so often, without time passing."""
@@ -550,7 +595,7 @@ class FakeNode:
                 for axis, channel in zip(self.axes, self.feedback_channels, strict=True):
                     axis.tick()
                     if axis.passed is not None:
-                        channel.index(axis.passed)
+                        channel.index(self.clk, axis.passed)
             self.clk += CLK_HZ // 1000
             if self.peripherals:
                 self.peripherals.millisecond(self)

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Protocol
 
-from twin.compiled.node import CLK_HZ, DEFINES, PERIOD, FakeNode
+from twin.compiled.node import CLK_HZ, DEFINES, PERIOD, CompiledNode
 from twin.compiled.station import Eeprom, I2cBus
 
 TURN_ARCSEC = 360 * 3600
@@ -27,11 +27,11 @@ class Part(Protocol):
     def write(self, offset: int, value: int) -> None:
         """Write a register of the block, which may be one of another part."""
 
-    def millisecond(self, machine: FakeNode) -> None:
+    def millisecond(self, machine: CompiledNode) -> None:
         """A millisecond of the node has passed."""
 
 
-class FakePeripherals:
+class PeripheralParts:
     """The block of registers; each part answers for its own."""
 
     def __init__(self, *parts: Part) -> None:
@@ -48,7 +48,7 @@ class FakePeripherals:
         for part in self.parts:
             part.write(offset, value)
 
-    def millisecond(self, machine: FakeNode) -> None:
+    def millisecond(self, machine: CompiledNode) -> None:
         """A millisecond of the node has passed."""
         for part in self.parts:
             part.millisecond(machine)
@@ -91,7 +91,7 @@ class Table:
             + self.wheel_error * math.sin(2 * math.pi * nut / TURN_ARCSEC + self.phases[1])
         )
 
-    def millisecond(self, machine: FakeNode) -> None:
+    def millisecond(self, machine: CompiledNode) -> None:
         """A millisecond of the node has passed."""
         worm = self.sign * machine.axes[0].machine / PERIOD * 4 * 0.18
         self.nut = max(worm, min(self.nut, worm + self.backlash))
@@ -138,7 +138,7 @@ class Sensor:
             + self.random.uniform(-self.noise, self.noise)
         )
 
-    def millisecond(self, machine: FakeNode) -> None:
+    def millisecond(self, machine: CompiledNode) -> None:
         """A millisecond of the node has passed."""
         self.table.millisecond(machine)
         self.before.append(self.table.angle)
@@ -189,7 +189,7 @@ class PeerPort:
         self.other: PeerPort | None = None
         self.spoil: Callable[[list[int]], Iterable[int]] = list
 
-    def millisecond(self, machine: FakeNode) -> None:
+    def millisecond(self, machine: CompiledNode) -> None:
         """A millisecond of the node has passed."""
         passed = [self.sent.popleft() for _ in range(min(self.CHARACTERS, len(self.sent)))]
         if self.other:
@@ -228,7 +228,7 @@ class I2c:
         self.bus.power_cut()
         return self.eeprom.power_cut(self.clk, random_source)
 
-    def millisecond(self, machine: FakeNode) -> None:
+    def millisecond(self, machine: CompiledNode) -> None:
         """A millisecond of the node has passed."""
         self.clk = machine.clk
 
@@ -264,7 +264,7 @@ class NumericDisplay:
             self.SIGNS[r[digit] & 15] + "." * (r[digit] >> 7) for digit in range(8, 0, -1)
         ).strip()
 
-    def millisecond(self, machine: FakeNode) -> None:
+    def millisecond(self, machine: CompiledNode) -> None:
         """A millisecond of the node has passed."""
         pass
 

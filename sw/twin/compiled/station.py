@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from twin.compiled.node import CLK_HZ, DEFINES, TABLE, Axis, FakeNode
+from twin.compiled.node import CLK_HZ, DEFINES, TABLE, Axis, CompiledNode
 
 BYTE_CLK, EDGE_CLK = CLK_HZ * 9 // 100_000, CLK_HZ // 100_000  # at 100 kHz
 STATE: dict[int, str] = {code: name for name, (code, _) in TABLE["job_state"].items()}
@@ -344,7 +344,7 @@ class Edm:
             self.set(0)
 
 
-class Station(FakeNode):
+class Station(CompiledNode):
     """The node, powered up. `absent` names the devices that are missing: eeprom, keypad, display.
     `peripherals_built` is the register peripherals.built, `seed` is that of the damage by power
     cuts.

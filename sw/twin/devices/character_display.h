@@ -37,9 +37,9 @@ class Hd44780 {
     void text(uint8_t* out) const {  // codes of the characters, line by line
         for (unsigned line = 0; line < LINES; line++)
             for (unsigned column = 0; column < COLUMNS; column++) {
-                const unsigned place = (line / 2 * COLUMNS + column + shift_) % ROW;
+                const unsigned cell = (line / 2 * COLUMNS + column + shift_) % ROW;
                 *out++ = on_ && (two_rows_ || line % 2 == 0)
-                             ? characters_[(line % 2) * SECOND + place]
+                             ? characters_[(line % 2) * SECOND + cell]
                              : ' ';
             }
     }
@@ -56,8 +56,8 @@ class Hd44780 {
     uint64_t clk(double seconds) const { return uint64_t(seconds * clk_hz_ + 1); }
     void advance() { address_ = moved(up_ ? 1 : -1); }
     uint8_t moved(int by) const {  // 0x00..0x27 and 0x40..0x67 make one ring
-        const int place = int(address_ % SECOND + (address_ >= SECOND ? ROW : 0)) + by,
-                  wrapped = (place + 2 * int(ROW)) % (2 * int(ROW));
+        const int cell = int(address_ % SECOND + (address_ >= SECOND ? ROW : 0)) + by,
+                  wrapped = (cell + 2 * int(ROW)) % (2 * int(ROW));
         return uint8_t(wrapped < int(ROW) ? wrapped : wrapped - int(ROW) + int(SECOND));
     }
     void execute(uint64_t now, bool data, uint8_t byte) {

@@ -70,7 +70,7 @@ void Devices::advance(uint64_t now, unsigned drive) {
     }
     if (woken || now >= edm_at_) edm_at_ = std::max(now + 1, edm.step(now, table_angle));
     const unsigned after = lines(), own = after ^ levels_ ^ changed;
-    if (own & KEYBOARD) keyboard_at_ = now + 1;  // they see their own pulls a clk later
+    if (own & KEYBOARD) keyboard_at_ = now + 1;  // they see their own pulls a cycle later
     if (own & MACHINE) computer_at_ = now + 1;
     event_at_ = std::min({keyboard_at_, computer_at_, edm_at_});
     levels_ = after | EDM_CUTTING * edm.cutting.level() | EDM_ALARM * edm.alarming.level();

@@ -3,8 +3,8 @@
 // guides with a flexure and a cable, linear scale with a reference mark, end stops and limit
 // switches.
 //
-//   m dv/dt = constant * current - flexure x - cable (x - place) - friction + stops + force from
-//   outside
+//   m dv/dt = constant * current - flexure x - cable (x - cable position) - friction +
+//   stops + force from outside
 #pragma once
 #include "parts/dac_input.h"
 #include "parts/friction.h"

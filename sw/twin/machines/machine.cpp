@@ -89,7 +89,7 @@ bool Machine::fault(const char* name, bool on, bool level) {
         forced_ |= pins;
         forced_high_ |= high;
     }
-    event_at_ = 0;  // the node sees it with the next clk
+    event_at_ = 0;  // the node sees it in the next cycle
     return known;
 }
 

@@ -68,7 +68,7 @@ unsigned bench_levels(Bench* bench) { return bench->machine->levels(); }
 void bench_pins(Bench* bench, unsigned values, unsigned which) { bench->pins(values, which); }
 void bench_run(Bench* bench, uint64_t clk) { bench->run(clk); }
 void bench_watch(Bench* bench, uint64_t clk,
-                 uint16_t* levels) {  // the same, with the levels after each clk
+                 uint16_t* levels) {  // the same, with the levels after each cycle
     for (uint64_t n = 0; n < clk; n++) {
         bench->run(1);
         levels[n] = uint16_t(bench->machine->levels());
@@ -88,8 +88,8 @@ void bench_bridge(Bench* bench, uint64_t clk, uint32_t period, int32_t on, int b
         clk -= now;
     }
 }
-// `count` pulses (negative: down), one every `period` clk, high for `high`, the direction `setup`
-// clk before the first.
+// `count` pulses (negative: down), one every `period` cycles, high for `high`, the direction
+// `setup` cycles before the first.
 void bench_steps(Bench* bench, int64_t count, uint32_t period, uint32_t high, uint32_t setup) {
     bench->pins((count > 0) * DIRECTION, DIRECTION);
     bench->run(setup);
@@ -140,8 +140,8 @@ void stage_frame(Bench* bench, double position, int count, uint8_t* bits) {
         interferometer.next_bit();
     }
 }
-// Levels (a in bit 0, b in bit 1) over n clk with the table moved at a constant speed from the
-// present clk on.
+// Levels (a in bit 0, b in bit 1) over n cycles with the table moved at a constant speed from the
+// present cycle on.
 void stage_levels(Bench* bench, uint64_t clk, double from, double speed, uint8_t* out) {
     for (uint64_t n = 0; n < clk; n++) {
         stage_of(bench).look(++bench->now, from + speed * double(n) / bench->clk_hz);

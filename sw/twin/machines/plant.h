@@ -10,7 +10,7 @@
 
 namespace twin {
 
-struct BridgeTime {  // how one time step was spent, clk
+struct BridgeTime {  // how one time step was spent, cycles
     uint32_t coast = 0, forward = 0, reverse = 0, brake = 0;
 };
 

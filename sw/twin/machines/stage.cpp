@@ -21,7 +21,7 @@ void Stage::configure() {
 }
 
 void Stage::drive_changed(uint64_t now, unsigned before, unsigned after) {
-    spend(now - 1, before);  // clk `now` itself is the first of the new state
+    spend(now - 1, before);  // cycle `now` itself is the first of the new state
     const unsigned falling = before & ~after;
     if (falling & ADC_CS_N)
         interferometer.chip_select(position(now));

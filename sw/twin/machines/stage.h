@@ -53,7 +53,7 @@ class Stage : public Machine {
     static constexpr uint64_t LEVELS_PER_STEP = 4;  // while the table moves
 
     void spend(uint64_t until,
-               unsigned drive) {  // the clk up to here went to this state of the bridge
+               unsigned drive) {  // the cycles up to here went to this state of the bridge
         spent_[drive & DRIVE_ENABLE ? (drive & BRIDGE_A ? 1 : 0) | (drive & BRIDGE_B ? 2 : 0)
                                     : 0] += uint32_t(until - spent_until_);
         spent_until_ = until;
@@ -70,7 +70,7 @@ class Stage : public Machine {
  private:
     double pushed_ = 0;
     uint64_t spent_until_ = 0;
-    std::array<uint32_t, 4> spent_{};  // clk in: coast, forward, reverse, brake
+    std::array<uint32_t, 4> spent_{};  // cycles in: coast, forward, reverse, brake
 };
 
 }  // namespace twin

@@ -50,8 +50,8 @@ void StepperStage::state(uint64_t now, double* out) const {
           motor_.field() * p_.screw_lead / (2 * M_PI), drivetrain_.speed, drivetrain_.force(),
           double(flag(LIMIT_LOW_OPEN)), double(flag(LIMIT_HIGH_OPEN)), double(flag(ENCODER_A)),
           double(flag(ENCODER_B)), double(flag(ENCODER_Z)), double((drive() & DRIVE_ENABLE) != 0),
-          double(scale_.counts()), double(motor_.steps), double(motor_.lost(drivetrain_.angle)),
-          double(motor_.timing_errors)})
+          double(scale_.counts()), double(scale_.changes()), double(motor_.steps),
+          double(motor_.lost(drivetrain_.angle)), double(motor_.timing_errors)})
         *out++ = value;
 }
 

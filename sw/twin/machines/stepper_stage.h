@@ -21,12 +21,12 @@ class StepperStage : public Machine {
     }
     void set_position(double where) override;
     void push(double newton) override { drivetrain_.external_force = newton; }
-    // nut, field: where motor and field would put the table; steps: taken by the driver; lost:
-    // microsteps behind the field, in whole slips
+    // nut, field: where motor and field would put the table; scale_changes: how often scale_counts
+    // has changed; steps: taken by the driver; lost: microsteps behind the field, in whole slips
     const char* state_names() const override {
         return "time_s position_m velocity_m_s nut_m field_m motor_rad_s screw_n limit_low? "
                "limit_high? a? b? z? enabled? "
-               "scale_counts# steps# lost_steps# step_timing_errors#";
+               "scale_counts# scale_changes# steps# lost_steps# step_timing_errors#";
     }
     void state(uint64_t now, double* out) const override;
 

@@ -5,7 +5,7 @@ namespace twin {
 
 void HostUart::add(bool level, uint64_t duration) {
     cells_.push_back({uint8_t(level), duration});
-    if (transmit_at_ == NEVER) transmit_at_ = 0;  // at the next clk
+    if (transmit_at_ == NEVER) transmit_at_ = 0;  // in the next cycle
 }
 
 void HostUart::send_words(const uint16_t* words, int count, const uint32_t* flips, int flip_count,

@@ -44,7 +44,7 @@ class HostUart {
     static constexpr uint64_t FRACTION = 1 << 16, NEVER = ~uint64_t(0);
     struct Cell {
         uint8_t level;
-        uint64_t duration;  // clk * FRACTION
+        uint64_t duration;  // cycles * FRACTION
     };
     void add(bool level, uint64_t duration);
     void transmit(uint64_t now);

@@ -249,7 +249,7 @@ uint64_t twin_now(Twin* t) { return t->now; }
 void twin_run(Twin* t, uint64_t clk) {
     while (clk--) t->step();
 }
-// Runs until `words` words are there or `clk` have passed; returns how many are there.
+// Runs until `words` words are there or `clk` cycles have passed; returns how many are there.
 int twin_run_until_words(Twin* t, int words, uint64_t clk) {
     const auto& received = t->bus.host.received;
     while (received.size() < size_t(words) && clk--) t->step();
@@ -280,7 +280,7 @@ void twin_cut(Twin* t, int node, int cut) {  // node -1: the host
     else
         t->bus.cut_node(node, Cut(cut));
 }
-// level, host drives, nodes that drive, collisions, framing errors, start glitches, edges, clk of
+// level, host drives, nodes that drive, collisions, framing errors, start glitches, edges, cycle of
 // last drive, words waiting
 void twin_bus_state(Twin* t, uint64_t* out) {
     uint64_t driving = 0;

@@ -40,7 +40,7 @@ class AngleSensor {
         return angle + ARC_SECOND * (error_ * std::sin(waves_ * angle + phase_) +
                                      noise_ * random_.uniform(-1, 1));
     }
-    // the line at clk `now`; returns the clk of what comes next
+    // the line in cycle `now`; returns the cycle of what comes next
     uint64_t advance(uint64_t now, double angle) {
         if (now >= sample_at_) {
             sample(angle);

@@ -28,7 +28,7 @@ class DacInput {
     double share() const { return (double(code) - ZERO) / ZERO; }  // of the reference, -1..1
 
     unsigned code = ZERO;                 // held by its reset until the first frame
-    uint64_t frames = 0, bad_frames = 0;  // bad: not of 16 clk
+    uint64_t frames = 0, bad_frames = 0;  // bad: not of 16 cycles
 
  private:
     uint16_t shift_ = ZERO;

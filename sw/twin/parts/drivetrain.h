@@ -2,16 +2,16 @@
 // Motor shaft, transmission with spring and backlash, body on guides between end stops. For a body
 // that turns read kgm2, rad and Nm for kg, m and N.
 //
-//   nut    = angle * way per radian + error           where the transmission would carry the body
-//   without a force force  = preload + spring and damper between nut and body, beyond the backlash
-//   on either side
+//   nut    = angle * travel per radian + error           where the transmission would carry the
+//   body without a force force  = preload + spring and damper between nut and body, beyond the
+//   backlash on either side
 #pragma once
 #include "parts/friction.h"
 
 namespace twin {
 
 struct DrivetrainParameters {
-    double shaft_inertia, way_per_radian, stiffness, damping, backlash, preload, mass;
+    double shaft_inertia, travel_per_radian, stiffness, damping, backlash, preload, mass;
     Friction bearing, guide;  // of the shaft, of the body
     double low_stop, high_stop, stop_stiffness, stop_damping;
 };
@@ -49,11 +49,11 @@ class Drivetrain {
         velocity = speed = 0;
         p.bearing.deflection = p.guide.deflection = 0;
         // the flank carries the preload, so nothing pulls at the body
-        angle = (where - error - p.backlash / 2 - p.preload / p.stiffness) / p.way_per_radian;
+        angle = (where - error - p.backlash / 2 - p.preload / p.stiffness) / p.travel_per_radian;
     }
-    double nut() const { return angle * p.way_per_radian + error; }
+    double nut() const { return angle * p.travel_per_radian + error; }
     double force() const {  // on the body
-        const double stretch = nut() - position, rate = speed * p.way_per_radian - velocity,
+        const double stretch = nut() - position, rate = speed * p.travel_per_radian - velocity,
                      play = p.backlash / 2;
         double flank = 0;
         if (stretch > play)
@@ -76,7 +76,7 @@ class Drivetrain {
             speed = 0;
         else
             speed += dt / p.shaft_inertia *
-                     (torque - p.bearing.force(speed, dt) - p.way_per_radian * push);
+                     (torque - p.bearing.force(speed, dt) - p.travel_per_radian * push);
         if (clamped)
             velocity = 0;
         else

@@ -21,10 +21,12 @@ class IncrementalScale {
         scatter_ = p.scale_index_scatter;
     }
     void move(double position, RandomSource& random) {
+        const int64_t counts_before = counts_;
         if (position >= double(counts_ + 1) * count_)
             counts_ = int64_t(std::floor(position / count_));
         else if (position < double(counts_) * count_ - hysteresis_)
             counts_ = int64_t(std::floor((position + hysteresis_) / count_));
+        changes_ += counts_ != counts_before;
         const bool before = z_;
         z_ = position >= index_ + rise_ && position < index_ + width_ + rise_;
         if (before && !z_) rise_ = random.uniform(-scatter_, scatter_);
@@ -43,17 +45,19 @@ class IncrementalScale {
         }
         return std::fmax(distance, 0);
     }
-    // the clk at which a body that moves on like this changes a level
+    // the cycle in which a body that moves on like this changes a level
     uint64_t next_change(uint64_t now, double position, double velocity, double clk_hz) const {
         const double clk =
             velocity ? way_to_change(position, velocity) / std::fabs(velocity) * clk_hz : 1e18;
         return clk < 1e15 ? now + 1 + uint64_t(clk) : NEVER;
     }
     int64_t counts() const { return counts_; }  // floor of position / count, but for the hysteresis
+    uint64_t changes() const { return changes_; }  // of the counts, in both directions
 
  private:
     double count_ = 1, hysteresis_ = 0, index_ = 0, width_ = 0, scatter_ = 0, rise_ = 0;
     int64_t counts_ = 0;
+    uint64_t changes_ = 0;
     bool z_ = false;
 };
 

@@ -28,7 +28,7 @@ class Interferometer {
 
     uint64_t advance(
         uint64_t now,
-        double position);  // levels at clk `now`; returns the clk of the next change of a spike
+        double position);  // levels in cycle `now`; returns the cycle of the next change of a spike
     void sample(double position);        // conversion of both channels
     void chip_select(double position) {  // falling edge of cs_n
         sample(position);

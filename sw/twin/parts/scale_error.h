@@ -24,9 +24,9 @@ class ScaleError {
         RandomSource random(~seed,
                             stream);  // a stream of its own: what else is random stays as it was
         double sum = 0;
-        for (double& place : walk_) place = sum += p.scale_walk * random.normal();
+        for (double& error : walk_) error = sum += p.scale_walk * random.normal();
         const double zero = walk_at(0);
-        for (double& place : walk_) place -= zero;
+        for (double& error : walk_) error -= zero;
     }
     double at(double x) const {
         return there_ ? linear_ * x + cyclic_ * std::sin(turns_ * x) + walk_at(x) : 0;
@@ -34,17 +34,17 @@ class ScaleError {
 
  private:
     static constexpr double WALK_STEP = 1e-3, WALK_FROM = -4e-3;
-    static constexpr int PLACES = 132;  // 4 mm farther than the travel of S0 on either side
+    static constexpr int POINTS = 132;  // 4 mm farther than the travel of S0 on either side
 
     double walk_at(double x) const {
-        const double place = std::fmin(std::fmax((x - WALK_FROM) / WALK_STEP, 0), PLACES - 1.001);
-        const int n = int(place);
-        return walk_[n] + (walk_[n + 1] - walk_[n]) * (place - n);
+        const double index = std::fmin(std::fmax((x - WALK_FROM) / WALK_STEP, 0), POINTS - 1.001);
+        const int n = int(index);
+        return walk_[n] + (walk_[n + 1] - walk_[n]) * (index - n);
     }
 
     bool there_ = false;
     double linear_ = 0, cyclic_ = 0, turns_ = 0;
-    std::array<double, PLACES> walk_{};
+    std::array<double, POINTS> walk_{};
 };
 
 }  // namespace twin

@@ -151,7 +151,7 @@ class Scope:
                     f"the scope of node {self.node.address} has no record after "
                     f"{units.format_time(patience)}: {dict(SCOPE_STATES.values())[state]}"
                 )
-            transport.wait(self.node.bus.poll_s)
+            self.node.bus.until_next_poll(self.node)
         return self.read()
 
     def read(self) -> Record:

@@ -24,7 +24,7 @@ from moire.errors import MoireError
 
 Array = NDArray[numpy.float64]
 Complex = NDArray[numpy.complex128]
-Filter = tuple[int, int, int, int, int]  # b0, b1, b2, -a1, -a2 of biquad_cascade
+Filter = tuple[int, int, int, int, int]  # b0, b1, b2, -a1, -a2 of a filter
 
 FULL_SCALE = 1 << 15  # of a command
 SCALES = {
@@ -35,7 +35,7 @@ SCALES = {
     "ka": 8,
 }  # fraction bits of the gains, as axis_registers has them
 MOST = (1 << 24) - 1
-COEFFICIENT = 1 << 30  # of biquad_cascade
+COEFFICIENT = 1 << 30  # of a filter
 LONGEST_DELAY = 12  # ticks that are tried
 SHORTEST_RECORD = 200  # ticks
 SHORTEST_SAMPLES = 60  # of a record with samples at any times

@@ -91,10 +91,12 @@ class Axis(AxisParameters, AxisCapture):
     def enable(self) -> None:
         """Switches the drive on; raises Refused while a fault is latched."""
         self.request("enable", on=1)
+        self.node.switched_on.add(self.number)
 
     def disable(self) -> None:
         """Switches the drive off at once, without a stop."""
         self.request("enable", on=0)
+        self.node.switched_on.discard(self.number)
 
     def reset(self) -> None:
         """Clears latched faults whose cause is gone. The drive stays off."""
@@ -237,16 +239,16 @@ class Axis(AxisParameters, AxisCapture):
                 progress(status)
             if status.ended != "running":
                 break
-            self.transport.wait(self.node.bus.poll_s)
+            self.node.bus.until_next_poll(self.node)
         if status.ended in ("ok", "no_motion_yet"):
             return status
         sentence = f"axis {self.number} of node {self.node.address}: {status.ended_words}"
         if status.ended == "ended_by_fault":
             sentence += f": {descriptions(FAULTS, status.first_fault or status.faults)}"
-        position, target = (
-            units.format_length(nm) for nm in (status.position_nm, status.target_nm)
-        )
-        sentence += f" (at {position}, target {target})"
+        sentence += f" (at {units.format_length(status.position_nm)}"
+        if status.ended == "not_settled":  # after a stop or a fault the target is the position
+            sentence += f", target {units.format_length(status.target_nm)}"
+        sentence += ")"
         raise MotionFailed(status.ended, CAUSE_CODES.get(status.ended, -1), sentence)
 
     def dwell(self, seconds: float, progress: Progress | None = None) -> Status:
@@ -259,7 +261,7 @@ class Axis(AxisParameters, AxisCapture):
             left = end - self.transport.now()
             if left <= 0:
                 return status
-            self.transport.wait(min(self.node.bus.poll_s, left))
+            self.node.bus.until_next_poll(self.node, min(self.node.bus.poll_s, left))
 
     def stop(self) -> None:
         """Begins a controlled stop; the drive stays on. It does not wait: see wait()."""
@@ -270,7 +272,7 @@ class Axis(AxisParameters, AxisCapture):
         try:
             self.stop()
             while self.status().in_motion:
-                self.transport.wait(self.node.bus.poll_s)
+                self.node.bus.until_next_poll(self.node)
         except Refused:
             pass  # the drive is off
         except (BusError, PortError) as error:

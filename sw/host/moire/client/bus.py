@@ -8,7 +8,8 @@
             print(axis.move(mm=1.5).position_nm)
 
 A drive stays on only while this host sends requests: the watchdog of a node switches it off when
-it has heard nothing for the time `watchdog_time`.
+it has heard nothing for the time `watchdog_time`. While the host waits for one node, it also polls
+the others whose drives it has switched on.
 """
 
 import random
@@ -113,6 +114,21 @@ class Bus:
         """Which build the node is; works with a node of any build."""
         reply = self.exchange(address, "identify", tries=tries, answer_s=answer_s)
         return Identity(**{**accepted(reply, address, "identify"), "address": address})
+
+    def until_next_poll(self, polled: Node, seconds: float | None = None) -> None:
+        """Lets the time between two polls of a node pass, `poll_s` unless another is given.
+
+        Each other node with a drive that this host has switched on gets a request, since a node's
+        watchdog hears only what is sent to that node. One that does not answer is not an error
+        here: whoever waits for it learns that.
+        """
+        self.transport.wait(self.poll_s if seconds is None else seconds)
+        for node in self.nodes.values():
+            if node is not polled and node.switched_on:
+                try:
+                    self.exchange(node.address, "position", tries=1, axis=min(node.switched_on))
+                except BusError:
+                    pass
 
     # finding nodes
 

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from moire import units
-from moire.client.records import CalibrationState
+from moire.client.records import CalibrationState, Status
 from moire.client.values import ParameterValue
 from moire.errors import MoireError, NotCalibrated, OutOfRange
 
@@ -41,13 +42,20 @@ def calibrate(
     axis.calibration("clear")
     axis.calibration("calibrate")
     end, strokes = axis.transport.now() + float(patience), 0
+    reason = "standstill"  # the latest one in motion: at the end of a stroke the axis is at rest
+
+    def follow(status: Status) -> None:
+        nonlocal reason
+        if status.state == "moving" and (now := axis.calibration().reason) != "standstill":
+            reason = now
+
     try:
         while True:
             speed = fastest * SPEEDS[strokes // 2 % len(SPEEDS)]
             axis.write_parameter("velocity", max(1, round(speed)))
-            axis.move(nm=start if strokes % 2 else far)
+            axis.move(nm=start if strokes % 2 else far, progress=follow)
             strokes += 1
-            state = axis.calibration()
+            state = replace(axis.calibration(), reason=reason)
             if progress is not None:
                 progress(state)
             if state.settled and strokes % 2 == 0:

@@ -161,7 +161,7 @@ class IndexingTable:
         while (state := self.state()).phase != "idle":
             if progress:
                 progress(state)
-            self.node.bus.transport.wait(self.node.bus.poll_s)
+            self.node.bus.until_next_poll(self.node)
         return state
 
     def stop(self) -> None:

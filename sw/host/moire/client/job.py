@@ -178,7 +178,7 @@ class Job:
         while (state := self.state()).state not in AT_REST:
             if progress:
                 progress(state)
-            self.node.bus.transport.wait(self.node.bus.poll_s)
+            self.node.bus.until_next_poll(self.node)
         return state
 
     def load(self, angles: Iterable[units.Value]) -> StationList:

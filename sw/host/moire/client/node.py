@@ -25,6 +25,7 @@ class Node:
         self.identity = bus.identify(address)
         self.identity.check()
         self.axes: dict[int, Axis] = {}
+        self.switched_on: set[int] = set()  # axes whose drive this host has switched on
 
     def request(self, operation: str, **fields: int) -> dict[str, int]:
         """Sends one request; see Bus.request()."""

@@ -47,7 +47,7 @@ def when_written(node: Node, operation: str, timeout_s: float) -> dict[str, int]
     began = transport.now()
     reply = node.request(operation)
     while reply["writing"] and transport.now() - began < timeout_s:
-        transport.wait(node.bus.poll_s)
+        node.bus.until_next_poll(node)
         reply = node.request(operation)
     return reply
 

@@ -221,7 +221,7 @@ class Segments:
         self.axis.set_parameter("segments", use)
         end = self.axis.transport.now() + PATIENCE_S
         while (status := self.status()).reason == "busy" and self.axis.transport.now() < end:
-            self.axis.transport.wait(self.axis.node.bus.poll_s)
+            self.axis.node.bus.until_next_poll(self.axis.node)
         return status
 
     def read_points(self) -> list[int]:

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x8D3F3B1E
+PROTOCOL_CRC = 0x22265732
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -119,6 +119,7 @@ FAULTS = {
     7: ("cpu", "the soft core stopped or hangs"),
     8: ("profile_underrun", "the profile ran out of segments"),
     9: ("step_overrun", "too many steps are pending: too fast for the step timing, or blocked"),
+    10: ("servo_overrun", "a servo tick came before the motion engine had served the last one"),
 }
 
 # bit: (name, words)

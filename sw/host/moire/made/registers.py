@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x2C7F6456  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x1698DDEA  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -773,14 +773,20 @@ FIELDS = (
         "latched faults: step overrun",
     ),
     Field(
+        "axis", "faults", "servo_overrun",
+        0x0C, 10, 1, False, "r", "",
+        Fraction(1, 1),
+        "latched faults: servo overrun",
+    ),
+    Field(
         "axis", "causes_now", "value",
-        0x10, 0, 10, False, "r", "",
+        0x10, 0, 11, False, "r", "",
         Fraction(1, 1),
         "causes present now, same bits as faults",
     ),
     Field(
         "axis", "first_fault", "value",
-        0x14, 0, 10, False, "r", "",
+        0x14, 0, 11, False, "r", "",
         Fraction(1, 1),
         "cause that came first, same bits as faults; one bit",
     ),
@@ -835,9 +841,10 @@ FIELDS = (
     ),
     Field(
         "axis", "sensing", "deglitch",
-        0x44, 0, 16, False, "rw", "cycle",
+        0x44, 0, 6, False, "rw", "sample",
         Fraction(1, 1),
-        "time that a, b and z must be stable",
+        "samples in a row that a, b and z must have the same level; one in each "
+        "edge_filter.skip + 1 cycles",
     ),
     Field(
         "axis", "sensing", "outlier_step",
@@ -945,13 +952,14 @@ FIELDS = (
     ),
     Field(
         "axis", "rejected_pulses", "value",
-        0x64, 0, 32, False, "rw", "",
+        0x64, 0, 16, False, "rw", "",
         Fraction(1, 1),
-        "pulses of a, b or z that the filter rejected; writing clears the count",
+        "pulses of a, b or z that the filter rejected; writing clears the count, which stops "
+        "at its largest value",
     ),
     Field(
         "axis", "rejected_samples", "value",
-        0x68, 0, 32, False, "rw", "",
+        0x68, 0, 16, False, "rw", "",
         Fraction(1, 1),
         "samples that the outlier filter rejected; writing clears the count",
     ),
@@ -992,52 +1000,65 @@ FIELDS = (
         "HAS_COMPARE: compare pulses",
     ),
     Field(
-        "axis", "built", "velocity",
+        "axis", "built", "encoder_check",
         0x6C, 6, 1, False, "r", "",
         Fraction(1, 1),
-        "HAS_VELOCITY: velocity estimator",
+        "HAS_ENCODER_CHECK: check of counts per revolution, count at the index, time of the "
+        "last edge",
+    ),
+    Field(
+        "axis", "built", "velocity",
+        0x6C, 7, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_VELOCITY: measured velocity",
     ),
     Field(
         "axis", "built", "drive",
-        0x6C, 7, 1, False, "r", "",
+        0x6C, 8, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_DRIVE: profile, servo, interlock; 0: the axis only measures",
     ),
     Field(
         "axis", "built", "bridge",
-        0x6C, 8, 1, False, "r", "",
+        0x6C, 9, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_BRIDGE: bridge",
     ),
     Field(
         "axis", "built", "stepper",
-        0x6C, 9, 1, False, "r", "",
+        0x6C, 10, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_STEPPER: step generator",
     ),
     Field(
         "axis", "built", "dac",
-        0x6C, 10, 1, False, "r", "",
+        0x6C, 11, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_DAC: DAC",
     ),
     Field(
         "axis", "built", "fine_stage",
-        0x6C, 11, 1, False, "r", "",
+        0x6C, 12, 1, False, "r", "",
         Fraction(1, 1),
         "HAS_FINE_STAGE: fine stage",
     ),
     Field(
         "axis", "built", "filters",
-        0x6C, 12, 3, False, "r", "",
+        0x6C, 13, 3, False, "r", "",
         Fraction(1, 1),
         "FILTERS: biquads of the servo; 0: none",
     ),
     Field(
         "axis", "built", "segments",
-        0x6C, 15, 8, False, "r", "",
+        0x6C, 16, 8, False, "r", "",
         Fraction(1, 1),
         "SEGMENTS: most segments of the table; 0: none",
+    ),
+    Field(
+        "axis", "integral_limit", "value",
+        0x70, 0, 15, False, "rw", "",
+        Fraction(1, 1),
+        "largest |integral term|; full scale 2^15",
     ),
     Field(
         "axis", "kp", "value",
@@ -1070,16 +1091,10 @@ FIELDS = (
         "acceleration feed-forward, on the target acceleration",
     ),
     Field(
-        "axis", "servo_limits", "output",
+        "axis", "output_limit", "value",
         0x94, 0, 15, False, "rw", "",
         Fraction(1, 1),
-        "largest |command|",
-    ),
-    Field(
-        "axis", "servo_limits", "integral",
-        0x94, 15, 15, False, "rw", "",
-        Fraction(1, 1),
-        "largest |integral term|",
+        "largest |command|; full scale 2^15",
     ),
     Field(
         "axis", "dead_band", "value",
@@ -1107,22 +1122,17 @@ FIELDS = (
         "command while closed_loop = 0",
     ),
     Field(
-        "axis", "filters", "in_use",
-        0xA8, 0, 4, False, "rw", "",
+        "axis", "filter_address", "value",
+        0xA8, 0, 5, False, "rw", "",
         Fraction(1, 1),
-        "bit n: section n filters; else it passes its input",
+        "number of a value of a filter: filter * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2, 5: "
+        "whether it filters, 0: no",
     ),
     Field(
-        "axis", "filters", "address",
-        0xA8, 4, 5, False, "rw", "",
-        Fraction(1, 1),
-        "section * 8 + coefficient; 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2",
-    ),
-    Field(
-        "axis", "filter_coefficient", "value",
+        "axis", "filter_value", "value",
         0xAC, 0, 32, True, "rw", "",
         Fraction(1, 1073741824),
-        "coefficient; writing stores it at filters.address",
+        "value of a filter; writing stores it at filter_address",
     ),
     Field(
         "axis", "segment_velocity", "value",
@@ -1167,16 +1177,11 @@ FIELDS = (
         "largest jerk of a controlled stop; 0: not limited",
     ),
     Field(
-        "axis", "feed_override", "fraction",
+        "axis", "feed_override", "value",
         0xD0, 0, 17, False, "rw", "",
         Fraction(1, 65536),
-        "fraction of full speed, 65536 at most",
-    ),
-    Field(
-        "axis", "feed_override", "pause",
-        0xD0, 17, 1, False, "rw", "",
-        Fraction(1, 1),
-        "1: pause inside the profile",
+        "feed override: fraction of full speed, 65536 at most, at which profiles are played; "
+        "0: pause",
     ),
     Field(
         "axis", "feed_override_slope", "value",
@@ -1600,12 +1605,6 @@ FIELDS = (
         "smallest step of the position; 0: the velocity is the distance of one tick",
     ),
     Field(
-        "feedback", "velocity_fine", "value",
-        0xA0, 0, 40, True, "r", "period/tick",
-        Fraction(1, 16777216),
-        "velocity with all its bits",
-    ),
-    Field(
         "feedback", "position_source", "counts",
         0xA8, 0, 1, False, "rw", "",
         Fraction(1, 1),
@@ -1758,10 +1757,10 @@ FIELDS = (
         "1: direction is low going up",
     ),
     Field(
-        "actuator", "step_output", "trim",
-        0x10, 4, 4, False, "rw", "",
-        Fraction(1, 1),
-        "shift of the command: it moves the target by command * 2^trim LSB of position",
+        "actuator", "step_trim", "value",
+        0x14, 0, 16, False, "rw", "period",
+        Fraction(1, 65536),
+        "motion of the target for one count of the command",
     ),
     Field(
         "actuator", "step_ratio", "value",

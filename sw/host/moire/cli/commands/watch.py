@@ -47,4 +47,5 @@ def watch(call: Call, every: Fraction | None, duration: Fraction | None) -> None
             shown = max(shown + step_s, call.now())
         if call.now() >= end:
             return
-        call.bus.transport.wait(min(call.bus.poll_s, max(0.0, min(shown, end) - call.now())))
+        left = max(0.0, min(shown, end) - call.now())
+        call.bus.until_next_poll(axis.node, min(call.bus.poll_s, left))

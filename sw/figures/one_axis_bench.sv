@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+// one_axis_bench -- one axis with its motion engine and its register memory, as in node.sv; the top
+// of sw/figures/interlock_run.cpp.
+`default_nettype none
+
+module one_axis_bench (
+    input  wire         clk,
+    input  wire         rst,
+    // register bus
+    input  wire         select,            // strobe: an access, while ready is high
+    input  wire         write,             // level: the access writes
+    input  wire  [15:0] address,           // byte address in the register map
+    input  wire  [31:0] wdata,             // value to write
+    output logic [31:0] rdata,             // live bits read, in the next cycle
+    output logic        ready,             // level: an access may come
+    // time
+    input  wire         tick,              // strobe: servo tick
+    input  wire  [23:0] tick_period,       // cycles
+    input  wire         sample_tick,       // strobe: take a sample
+    input  wire         limit_tick,        // strobe: an eighth of the time of a limit switch
+    input  wire  [31:0] now,               // cycles
+    // node
+    input  wire         estop,             // level: 1 pressed
+    input  wire         watchdog_expired,  // level: the master of the bus is silent
+    input  wire         cpu_stopped,       // level: the soft core has stopped or hangs
+    // pins
+    input  wire         encoder_a,         // pin
+    input  wire         encoder_b,         // pin
+    input  wire         limit_low_open,    // pin, 1: pressed or wire cut
+    input  wire         limit_high_open,   // pin, 1: pressed or wire cut
+    input  wire         drive_fault_n,     // pin, 0: the drive reports a fault
+    output logic        bridge_a,          // pin
+    output logic        bridge_b,          // pin
+    output logic        step,              // pin
+    output logic        direction,         // pin
+    output logic        drive_enable,      // pin, 1: the drive may be on
+    output logic [47:0] target,            // 2^-16 period, of the engine
+    output logic [15:0] cycles             // cycles that a tick needs at most
+);
+    wire memory_ready, stores, hold, waits, setting_write, setting_waits, engine_ready;
+    wire [13:0] stored_at;
+    wire [31:0] stored_value, wdata_low, settings, live, feedback_rdata, actuator_rdata;
+    wire [2:0] setting_axis, result_axis, result_kind;
+    wire        [ 6:0] setting_word;
+    wire        [ 1:0] setting_filter;
+    wire signed [63:0] setting;
+    wire gains_changed, push, pending, moves, moved, request_waits, busy, overrun;
+    wire step_made, step_down, block_up, block_down, closed_loop, play, arm, controlled_stop;
+    wire hold_target, result_valid, result_flag;
+    wire [47:0] position, moved_by, result;
+    wire signed [47:0] shift_by;
+    wire line_start, line_idle, rate_valid, rate_restart, rate_steep, line_stopped;
+    wire signed [36:0] rate;
+    wire        [ 7:0] chain_setting_written;
+    wire chain_harmonic_enable, chain_learn, sample_valid;
+    wire signed [7:0] sample_sin, sample_cos;
+    wire signed [31:0] quadrature_count;
+    wire compare_pulse, adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi;
+
+    assign ready  = memory_ready && !waits;
+    assign target = u_axis.target;
+    assign rdata = live | feedback_rdata | actuator_rdata;
+
+    register_memory u_memory (
+        .clk,
+        .rst,
+        .hold,
+        .select,
+        .write,
+        .address(address[15:2]),
+        .wdata,
+        .ready  (memory_ready),
+        .rdata  (settings),
+        .wdata_low,
+        .stores,
+        .stored_at,
+        .stored_value
+    );
+    engine_bus #(
+        .FILTERS(2)
+    ) u_bus (
+        .clk,
+        .rst,
+        .stores,
+        .address  (stored_at),
+        .value    (stored_value),
+        .value_low(wdata_low),
+        .hold,
+        .waits,
+        .ready    (engine_ready),
+        .setting_waits,
+        .setting_write,
+        .setting_axis,
+        .setting_word,
+        .setting_filter,
+        .setting,
+        .gains_changed,
+        .push,
+        .pending,
+        .moves,
+        .moved,
+        .moved_by,
+        .shift_by
+    );
+    motion_engine #(
+        .FILTERS(2)
+    ) u_engine (
+        .clk,
+        .rst,
+        .tick,
+        .now,
+        .setting_write,
+        .setting_axis,
+        .setting_word,
+        .setting_filter,
+        .setting,
+        .setting_waits,
+        .position,
+        .stepped               (step_made),
+        .downward              (step_down),
+        .block_up,
+        .block_down,
+        .closed_loop,
+        .start                 (play),
+        .arm,
+        .controlled_stop,
+        .set_target_to_position(hold_target),
+        .push,
+        .gains_changed,
+        .shift                 (moved),
+        .shift_by,
+        .waits                 (request_waits),
+        .result_valid,
+        .result_axis,
+        .result_kind,
+        .result,
+        .result_flag,
+        .ready                 (engine_ready),
+        .busy,
+        .overrun,
+        .cycles
+    );
+    step_lines u_lines (
+        .clk,
+        .rst,
+        .period    (tick_period[17:0]),
+        .tick,
+        .valid     (result_valid && result_kind == 3'd6),
+        .axis      (result_axis),
+        .target    (result),
+        .restart_in(result_flag),
+        .stopped   (line_stopped),
+        .line_start,
+        .line_idle,
+        .rate_valid,
+        .rate,
+        .rate_restart,
+        .rate_steep
+    );
+    axis u_axis (
+        .clk,
+        .rst,
+        .select            (select && address[15:8] == 8'h04),
+        .feedback_select   (select && address[15:8] == 8'h0C),
+        .actuator_select   (select && address[15:8] == 8'h14),
+        .write,
+        .word              (address[7:2]),
+        .wdata,
+        .wdata_low,
+        .rdata             (live),
+        .feedback_rdata,
+        .actuator_rdata,
+        .tick,
+        .sample_tick,
+        .limit_tick,
+        .now,
+        .start             (1'b0),
+        .servo_overrun     (overrun),
+        .sync              (1'b0),
+        .estop,
+        .watchdog_expired,
+        .cpu_stopped,
+        .position,
+        .step_made,
+        .step_down,
+        .moves,
+        .moved,
+        .moved_by,
+        .block_up,
+        .block_down,
+        .closed_loop,
+        .play,
+        .arm,
+        .controlled_stop,
+        .hold_target,
+        .waits             (request_waits),
+        .pending,
+        .result_valid,
+        .result_kind,
+        .result,
+        .result_flag,
+        .line_start,
+        .line_idle,
+        .rate_valid,
+        .rate,
+        .rate_restart,
+        .rate_steep,
+        .line_stopped,
+        // without a shared chain
+        .chain_setting_written,
+        .chain_harmonic_enable,
+        .chain_learn,
+        .sample_valid,
+        .sample_sin,
+        .sample_cos,
+        .quadrature_count,
+        .chain_sampled     (1'b0),
+        .chain_sin         (8'd0),
+        .chain_cos         (8'd0),
+        .chain_rejected    (1'b0),
+        .chain_phase_valid (1'b0),
+        .chain_plain_phase (16'd0),
+        .chain_done        (1'b0),
+        .chain_step        (17'sd0),
+        .chain_phase       (16'd0),
+        .chain_overspeed   (1'b0),
+        .chain_disagreement(1'b0),
+        .chain_overrun     (1'b0),
+        .encoder_a,
+        .encoder_b,
+        .encoder_z         (1'b0),
+        .probe             (2'b00),
+        .adc_sin           (1'b0),
+        .adc_cos           (1'b0),
+        .adc_cs_n,
+        .adc_sclk,
+        .compare_pulse,
+        .limit_low_open,
+        .limit_high_open,
+        .drive_fault_n,
+        .bridge_a,
+        .bridge_b,
+        .step,
+        .direction,
+        .dac_cs_n,
+        .dac_sclk,
+        .dac_sdi,
+        .drive_enable
+    );
+
+    wire chain = &{
+        1'b0, chain_setting_written, chain_harmonic_enable, chain_learn, sample_valid, sample_sin,
+        sample_cos, quadrature_count
+    };
+    wire unused = &{
+        1'b0, chain, address[1:0], tick_period[23:18], settings, busy, compare_pulse, adc_cs_n,
+        adc_sclk, dac_cs_n, dac_sclk, dac_sdi
+    };
+endmodule
+
+`default_nettype wire

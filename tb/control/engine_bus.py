@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model of rtl/control/engine_bus.sv in integers: waits(...) are the levels in this cycle, clk(...)
+then advances one cycle.
+"""
+
+from tb.control.engine_words import FOUND
+
+WORD = 1 << 32
+
+
+def signed(value, bits):
+    return (value + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
+
+
+class EngineBus:
+    def __init__(self, axes, filters):
+        self.axes, self.filters = axes, filters
+        self.reset()
+
+    def reset(self):
+        self.setting = None  # (axis, number, filter, value) that is being given
+        self.pushes, self.filter_at, self.axis = False, 0, 0
+        self.gains = self.push = 0  # bits of axes
+        self.shift_by = None
+
+    def waits(self, ready=1, setting_waits=0, pending=0, moves=0, moved=0):
+        """(hold, waits)"""
+        hold = bool(self.setting) or setting_waits or self.pushes or not ready
+        return int(hold), int(hold or self.push | pending | moves | moved > 0)
+
+    def word_of(self, address):
+        """(axis, word) of an address of the map, or None."""
+        block = (address >> 6) - 4
+        word = FOUND.get((block >> 3, address & 63)) if 0 <= block < 24 else None
+        return (block & 7, word) if word else (0, None)
+
+    def value_of(self, word, value, value_low):
+        """The value of the setting in the unit of the engine."""
+        if word.wide:
+            return signed(value << 32 | value_low, 64)
+        if word.name == "override":
+            return min(value, 65536) << 16
+        return (signed(value, 32) if word.signed else value) << word.shift
+
+    def clk(
+        self,
+        stores=0,
+        address=0,
+        value=0,
+        value_low=0,
+        setting_waits=0,
+        moved=0,
+        moved_by=(),
+        rst=0,
+    ):
+        """Advance one cycle. moved: bits of axes."""
+        if rst:
+            self.reset()
+            return
+        for n in range(self.axes):
+            if moved >> n & 1:
+                self.shift_by = moved_by[n]
+        done = not self.setting and not setting_waits
+        self.push = int(done and self.pushes) << self.axis
+        self.pushes = self.pushes and not done
+        self.gains, self.setting = 0, None
+        axis, word = self.word_of(address)
+        filter_at = self.filter_at
+        if stores and word and axis < self.axes and word.name == "filter_address":
+            self.filter_at = value & 31
+        if not stores or not word or word.name == "filter_address" or axis >= self.axes:
+            return
+        number = word.number
+        if word.name == "filter_value":
+            if filter_at >> 3 >= self.filters:
+                return
+            number = 0x50 + (filter_at & 7)
+        self.axis = axis
+        self.setting = axis, number, filter_at >> 3, self.value_of(word, value, value_low)
+        self.pushes = word.name == "segment_ticks"
+        self.gains = int(word.name in ("kp", "kd", "kv", "ka")) << axis

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""engine_bus: settings in the units of the engine, the push of a segment, what the soft core waits
+for, and random words against the model in every cycle.
+"""
+
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge, Timer
+
+from moire.made.registers import FIELDS
+from tables.engine_microcode import OPERANDS
+from tb.bench import run, start
+from tb.control.engine_bus import EngineBus
+from tb.control.engine_words import FOUND
+from tb.registers.register_layout import RegisterLayout
+
+IDLE = dict(stores=0, address=0, value=0, value_low=0, setting_waits=0, pending=0, moves=0, moved=0)
+LEVELS = ("setting_waits", "pending", "moves", "moved")
+
+
+def address_of(block, register, axis=0):
+    field = next(f for f in FIELDS if (f.block, f.register) == (block, register))
+    return field.address(axis) // 4
+
+
+class Bus:
+    """The design with the model beside it in every cycle."""
+
+    def __init__(self, dut):
+        self.dut, self.axes = dut, int(dut.AXES.value)
+        self.model = EngineBus(self.axes, int(dut.FILTERS.value))
+
+    async def reset(self):
+        await start(self.dut, **IDLE, ready=1, moved_by=0)
+        await FallingEdge(self.dut.clk)
+        return self
+
+    async def clk(self, rst=0, ready=1, moved_by=None, **inputs):
+        """Advance one cycle; returns (hold, waits) in it."""
+        dut, model = self.dut, self.model
+        inputs, moved_by = IDLE | inputs, moved_by or [0] * self.axes
+        for name, level in inputs.items():
+            getattr(dut, name).value = level
+        dut.rst.value, dut.ready.value = rst, ready
+        dut.moved_by.value = sum((by & (1 << 48) - 1) << 48 * n for n, by in enumerate(moved_by))
+        await Timer(1, "ns")
+        waits = model.waits(ready, **{name: inputs[name] for name in LEVELS})
+        assert (int(dut.hold.value), int(dut.waits.value)) == waits
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        left = {k: v for k, v in inputs.items() if k not in ("pending", "moves")}
+        model.clk(rst=rst, moved_by=moved_by, **left)
+        assert int(dut.setting_write.value) == int(model.setting is not None)
+        assert int(dut.gains_changed.value) == model.gains
+        assert int(dut.push.value) == model.push
+        if model.setting:
+            assert self.setting() == model.setting
+        if model.shift_by is not None:
+            assert dut.shift_by.value.to_signed() == model.shift_by
+        return waits
+
+    def setting(self):
+        """(axis, number, filter, value) on the pins."""
+        dut = self.dut
+        names = ("setting_axis", "setting_word", "setting_filter")
+        return (*(int(getattr(dut, n).value) for n in names), dut.setting.value.to_signed())
+
+    async def write(self, block, register, value, axis=0, value_low=0):
+        address = address_of(block, register, axis)
+        if value_low or register in ("segment_velocity", "step_ratio"):
+            address += 1
+        await self.clk(stores=1, address=address, value=value, value_low=value_low)
+        found = self.setting() if int(self.dut.setting_write.value) else None
+        return found and (found[1], found[3])
+
+
+@cocotb.test()
+async def latency_is_1_and_settings_have_the_units_of_the_engine(dut):
+    bus = await Bus(dut).reset()
+    for block, register, value, name, wanted in (
+        ("axis", "kp", 77, "kp", 77),
+        ("axis", "ka", 3, "ka", 3 << 8),
+        ("axis", "output_limit", 0x7FFF, "output_limit", 0x7FFF << 16),
+        ("axis", "integral_limit", 0x7FFF, "integral_limit", 0x7FFF << 24),
+        ("axis", "stop_deceleration", 0xFFFF_FFFF, "stop_deceleration", 0xFFFF_FFFF << 8),
+        ("axis", "feed_override", 65536, "override", 1 << 32),
+        ("axis", "feed_override", 65537, "override", 1 << 32),
+        ("axis", "feed_override", 65535, "override", 65535 << 16),
+        ("axis", "open_command", 0xFFFF_FFFF, "open_command", -1),
+        ("axis", "following_limit", 0xFFFF_FFFF, "following_limit", 0xFFFF_FFFF),
+        ("feedback", "velocity_quantum", 9, "quantum", 9),
+        ("actuator", "step_trim", 8, "trim_scale", 8),
+    ):
+        assert await bus.write(block, register, value) == (OPERANDS[name], wanted)
+    found = await bus.write("axis", "segment_velocity", 0xFFFF_FFFE, value_low=5)
+    assert found == (OPERANDS["segment_velocity"], 5 - (2 << 32))
+    assert await bus.write("axis", "control", 1) is None
+    assert await bus.write("axis", "position", 1) is None
+
+
+@cocotb.test()
+async def the_values_of_a_filter_have_one_register(dut):
+    bus = await Bus(dut).reset()
+    for number, value in ((0, 1), (13, -5 & 0xFFFF_FFFF), (31, 7)):
+        assert await bus.write("axis", "filter_address", number) is None
+        found = await bus.write("axis", "filter_value", value)
+        there = number >> 3 < bus.model.filters
+        value -= (value >> 31) << 32
+        assert found == ((0x50 + number % 8, value << 2) if there else None)
+        assert not there or bus.setting()[2] == number >> 3
+
+
+@cocotb.test()
+async def an_axis_that_is_not_built_is_left_out(dut):
+    bus = await Bus(dut).reset()
+    for axis in range(8):
+        assert (await bus.write("axis", "kp", 1, axis) is not None) == (axis < bus.axes)
+
+
+@cocotb.test()
+async def a_segment_is_pushed_when_its_last_word_is_written(dut):
+    bus = await Bus(dut).reset()
+    await bus.write("axis", "segment_ticks", 5)
+    assert await bus.clk() == (1, 1) and not int(dut.push.value)
+    for _ in range(4):
+        assert await bus.clk(setting_waits=1) == (1, 1) and not int(dut.push.value)
+    assert await bus.clk() == (1, 1) and int(dut.push.value) == 1
+    assert await bus.clk() == (0, 1) and not int(dut.push.value)
+    assert await bus.clk() == (0, 0)
+
+
+@cocotb.test()
+async def the_soft_core_waits_for_everything_that_was_requested(dut):
+    bus = await Bus(dut).reset()
+    assert await bus.clk() == (0, 0)
+    assert await bus.clk(ready=0) == (1, 1)
+    assert await bus.clk(setting_waits=1) == (1, 1)
+    for name in ("pending", "moves", "moved"):
+        assert await bus.clk(**{name: 1 << bus.axes - 1}) == (0, 1)
+
+
+@cocotb.test()
+async def random_words_match_the_model(dut):
+    bus = await Bus(dut).reset()
+    known = [4 + 8 * kind + axis << 6 | word for kind, word in FOUND for axis in range(bus.axes)]
+    layout = RegisterLayout(bus.axes)  # values are as the register memory stores them
+    left = 0  # cycles for which the last setting waits
+    for _ in range(6000):
+        stores = 0
+        if not left and bus.model.setting is None and not bus.model.pushes:
+            stores = int(random.random() < 0.6)
+        address = random.choice((random.choice(known), random.getrandbits(14)))
+        value = random.choice((random.getrandbits(32), random.getrandbits(17), 65536))
+        await bus.clk(
+            rst=int(random.random() < 0.005),
+            stores=stores,
+            address=address,
+            value=layout.kept(address, value),
+            value_low=random.getrandbits(32),
+            setting_waits=int(left > 0),
+            moved=random.getrandbits(bus.axes) if random.random() < 0.1 else 0,
+            moved_by=[random.getrandbits(48) - (1 << 47) for _ in range(bus.axes)],
+            pending=int(random.random() < 0.1),
+        )
+        left = random.randrange(4) if bus.model.setting else max(0, left - 1)
+
+
+@pytest.mark.parametrize("axes, filters", [(1, 0), (3, 2), (8, 4)])
+def test_engine_bus(axes, filters):
+    run("engine_bus", __file__, AXES=axes, FILTERS=filters)
