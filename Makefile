@@ -32,9 +32,9 @@ check: fresh lint promises test prove quick  ## what every change must pass
 	@echo 'check: all passed'
 
 promises: $(SETUP)  ## what the project promises of its code: units, latencies, imports, tests, types
-	$(call say,promises: units of ports; latencies; imports; tests that can fail; strict types)
+	$(call say,promises: columns; units of ports; latencies; imports; tests that can fail; strict types)
 	@failed=0; for check in $(PROMISES); do $(PYTHON) -m tools.check_$$check || failed=1; done; exit $$failed
-PROMISES := ports latency imports tests types
+PROMISES := columns ports latency imports tests types
 
 lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the layout of all code
 	$(call say,lint: verilator -Wall over $(words $(RTL)) modules; ruff; the formatters)

@@ -38,8 +38,9 @@ module engine_inputs (
     output logic               asked,          // level: a request other than gains waits
     output logic               gains           // level: a gain changed, taken or not
 );
-    // levels: {lost_off, lost, closed_loop, block_down, block_up, down, stepped}; lost: the loop was
-    // open or the drive was off in some cycle since the tick before, lost_off: the drive was off
+    // levels: {lost_off, lost, closed_loop, block_down, block_up, down, stepped}; lost: the loop
+    // was open or the drive was off in some cycle since the tick before, lost_off: the drive was
+    // off
     logic [6:0] live;
     logic step_live, step_down, lost_live, lost_off_live;
     logic [23:0] step_elapsed;

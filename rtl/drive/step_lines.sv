@@ -15,11 +15,11 @@
 // behaviour The first line after `stopped`, and one to a target with restart_in, has the rate 0 and
 //           begins and ends at the whole step below the target (rate_restart). A target that is a
 //           step per cycle or more away has no rate (rate_steep).
-// limits    period may change only while no axis moves. AXES * (RATE_F + 4) cycles must be less than
-//           what is left of a tick when the last target comes.
+// limits    period may change only while no axis moves. AXES * (RATE_F + 4) cycles must be less
+//           than what is left of a tick when the last target comes.
 // model     tb/drive/step_lines.py, equal in every bit of every cycle
-// proved    Lines begin at least `period` cycles apart, unless no axis follows them. A rate that was
-//           given is never replaced before a line has begun with it.
+// proved    Lines begin at least `period` cycles apart, unless no axis follows them. A rate that
+//           was given is never replaced before a line has begun with it.
 // proof     depth 12, AXES = 2, PERIOD_W = 3, RATE_F = 20
 `default_nettype none
 

@@ -2,8 +2,8 @@
 // axis_inputs -- brings the input pins of an axis into the clock domain, and filters its limit
 // switches.
 //
-// latency  2 cycles from a pin to its level; as in switch_filter, with 8 periods of limit_tick, from
-//          there to limit_low and limit_high
+// latency  2 cycles from a pin to its level; as in switch_filter, with 8 periods of limit_tick,
+//          from there to limit_low and limit_high
 // rate     one change of each pin per cycle; a limit switch changes at most every 8 periods of
 //          limit_tick
 // behaviour  limit_low_open and limit_high_open are high when the switch is pressed or its wire is

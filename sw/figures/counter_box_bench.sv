@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// counter_box_bench -- the pins of a box that counts four A/B/Z scales: a node without drives, whose
-// unused pins are tied off, so that it fits the pads of a small part.
+// counter_box_bench -- the pins of a box that counts four A/B/Z scales: a node without drives,
+// whose unused pins are tied off, so that it fits the pads of a small part.
 `default_nettype none
 
 module counter_box_bench #(

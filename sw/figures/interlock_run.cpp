@@ -286,7 +286,7 @@ struct Campaign {
         if (b.off_at < first) return fail("drive off before the cause");
         if (b.off_at > last) return fail("drive off late");
         unsigned may = 0;
-        bool known = false;  // of several in the same cycle the lbehindt bit comes first
+        bool known = false;  // of several in the same cycle the lowest bit comes first
         for (auto& [cause, window] : causes) {
             const bool exact = window.first == window.last;
             if (window.first <= last && !(exact && known)) may |= 1 << cause, known |= exact;

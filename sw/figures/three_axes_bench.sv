@@ -30,7 +30,8 @@ module three_axes_bench (
     for (genvar n = 0; n < 3; n++) begin : g_axis
         wire [31:0] actuator_rdata;
         wire adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction, dac_cs_n, dac_sclk, dac_sdi;
-        wire drive_enable, compare_pulse, line_stopped, step_made, step_down, moves, moved, block_up, block_down;
+        wire drive_enable, compare_pulse, line_stopped, step_made, step_down, moves, moved;
+        wire block_up, block_down;
         wire closed_loop, play, arm, controlled_stop, hold_target, pending;
         wire [47:0] position, moved_by;
         wire [7:0] chain_setting_written;

@@ -6,7 +6,7 @@ import ast
 import pytest
 
 from tables import modules
-from tools import check_imports, check_latency, check_ports
+from tools import check_columns, check_imports, check_latency, check_ports
 
 MODULE = """// SPDX-License-Identifier: Apache-2.0
 // thing -- adds.
@@ -33,13 +33,18 @@ endmodule
 @pytest.fixture
 def module(tmp_path, monkeypatch):
     """A module with bare ports and latencies to be tested, in a project of its own."""
-    for part in (modules, check_latency, check_ports):
+    for part in (modules, check_columns, check_latency, check_ports):
         monkeypatch.setattr(part, "ROOT", tmp_path)
     path = tmp_path / "rtl" / "block" / "thing.sv"
     (tmp_path / "tb" / "block").mkdir(parents=True)
     path.parent.mkdir(parents=True)
     path.write_text(MODULE)
     return path
+
+
+def test_a_line_of_more_than_100_columns_is_found_and_one_of_100_is_not(module):
+    module.write_text(f"// {'π' * 97}\n// {'a' * 98}\n")
+    assert check_columns.problems() == ["rtl/block/thing.sv:2: 101"]
 
 
 def test_a_port_and_a_parameter_without_a_comment_are_found(module):
