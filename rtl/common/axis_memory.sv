@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis_memory -- one word for each axis of a node, in LUT RAM: the state or a setting of a block that
-// serves several axes.
+// axis_memory -- one word for each axis of a node, in LUT RAM: the state or a setting of a block
+// that serves several axes.
 //
 // latency  0 cycles from axis to stored, combinational; 1 cycle from write to the new word
 // rate     one read and one write per cycle

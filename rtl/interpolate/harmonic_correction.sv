@@ -37,7 +37,8 @@ module harmonic_correction #(
 );
     localparam int B = AXES == 1 ? 8 : A + 8;  // bits of an address: axis, table, half a point
 
-    // a table is never read and written at once, so the memory need not care what it would read then
+    // a table is never read and written at once, so the memory need not care what it would read
+    // then
     (* no_rw_check *)logic signed [17:0] even_table[0:(1<<B)-1];
     (* no_rw_check *)logic signed [17:0] odd_table [0:(1<<B)-1];
     logic [AXES-1:0] page, swapped;  // the table in use; swapped: there is one
