@@ -19,6 +19,7 @@
 module axis #(
     parameter int W = 8,  // bits of a sample
     parameter int SEGMENTS = 0,  // most segments of the scale's table; 0: no table
+    parameter int ADC_FRAME = 14,  // clocks of a conversion
     parameter int HAS_SINE = 1,  // 0: no sine and cosine, positions of counts only
     parameter int HAS_OWN_CHAIN = HAS_SINE,  // 1: build a chain for this axis; 0: one of the node
     parameter int HAS_MONITOR = HAS_SINE,  // 1: build the signal monitor; needs the sine
@@ -56,6 +57,7 @@ module axis #(
     // node
     input wire start,  // strobe: play the queued segments, with other axes
     input wire servo_overrun,  // strobe: a servo tick came too soon
+    input wire sample_overrun,  // strobe: the shared chain has lost a sample
     input wire sync,  // strobe: the sync pulse of the bus captures
     input wire estop,  // level: 1 pressed
     input wire watchdog_expired,  // level: the master of the bus is silent
@@ -119,7 +121,7 @@ module axis #(
     input wire [15:0] chain_phase,  // 2^-16 period, corrected
     input wire chain_overspeed,  // strobe: the speed is too high
     input wire chain_disagreement,  // level: position and count differ
-    input wire chain_overrun,  // strobe: a sample was lost
+    input wire chain_lost,  // strobe: a sample of this axis was lost
     // pins of the machine
     input wire limit_low_open,  // pin, 1: pressed or wire cut
     input wire limit_high_open,  // pin, 1: pressed or wire cut
@@ -171,7 +173,7 @@ module axis #(
     wire moving, armed, saturated, line_up, line_down, underrun;
     wire compared, too_far, commanded;
     // interlock and drive
-    wire [10:0] faults, causes_now, first_fault;
+    wire [11:0] faults, causes_now, first_fault;
     wire signed [47:0] fault_position;
     wire downward, fine_saturated;
 
@@ -198,6 +200,7 @@ module axis #(
     );
     feedback_channel #(
         .W                (W),
+        .ADC_FRAME        (ADC_FRAME),
         .SEGMENTS         (SEGMENTS),
         .HAS_SINE         (HAS_SINE),
         .HAS_OWN_CHAIN    (HAS_OWN_CHAIN),
@@ -262,7 +265,7 @@ module axis #(
         .chain_phase,
         .chain_overspeed,
         .chain_disagreement,
-        .chain_overrun,
+        .chain_lost,
         // signals
         .sin,
         .cos,
@@ -357,6 +360,7 @@ module axis #(
             .profile_underrun(underrun),
             .step_overrun,
             .servo_overrun,
+            .sample_overrun,
             // command
             .position,
             .valid_in        (commanded),
@@ -438,7 +442,7 @@ module axis #(
         };
         wire unused_causes = &{
             1'b0, estop, watchdog_expired, cpu_stopped, limit_low, limit_high, drive_fault,
-            encoder_fault, servo_overrun, underrun, too_far
+            encoder_fault, servo_overrun, sample_overrun, underrun, too_far
         };
         wire unused_motion = &{
             1'b0, line_up, line_down, compared, commanded, servo_command, line_idle, rate_valid,

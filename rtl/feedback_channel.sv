@@ -18,6 +18,7 @@
 module feedback_channel #(
     parameter int W = 8,  // bits of a sample
     parameter int SEGMENTS = 0,  // most segments of the table, 3 to 255; 0: no table
+    parameter int ADC_FRAME = 14,  // clocks of a conversion
     parameter int HAS_SINE = 1,  // 0: no sine and cosine, the position is made of counts
     parameter int HAS_OWN_CHAIN = HAS_SINE,  // 1: build a chain for this axis; 0: one of the node
     parameter int HAS_MONITOR = HAS_SINE,  // 1: build the signal monitor; needs the sine
@@ -83,7 +84,7 @@ module feedback_channel #(
     input wire [15:0] chain_phase,  // 2^-16 period, corrected
     input wire chain_overspeed,  // strobe: the speed is too high
     input wire chain_disagreement,  // level: position and count differ
-    input wire chain_overrun,  // strobe: a sample was lost
+    input wire chain_lost,  // strobe: a sample of this axis was lost
     // signals
     output logic signed [W-1:0] sin,  // ADC counts, after the outlier filter
     output logic signed [W-1:0] cos,  // ADC counts, after the outlier filter
@@ -269,7 +270,8 @@ module feedback_channel #(
         wire [15:0] plain_phase;
 
         dual_adc_reader #(
-            .W(W)
+            .W    (W),
+            .FRAME(ADC_FRAME)
         ) u_adc (
             .clk,
             .rst,
@@ -285,6 +287,8 @@ module feedback_channel #(
             .cos    (raw_cos)
         );
         if (HAS_OWN_CHAIN != 0) begin : g_own_chain
+            wire own_overrun;  // never: one axis has nothing to wait for
+
             interpolation_chain #(
                 .AXES         (1),
                 .W            (W),
@@ -317,16 +321,17 @@ module feedback_channel #(
                 .overspeed(too_fast),
                 // faults
                 .disagreement,
-                .overrun  (sample_lost)
+                .overrun  (own_overrun),
+                .lost     (sample_lost)
             );
             assign {sin, cos, phase} = {sampled_sin, sampled_cos, tracked_phase};
             assign {chain_setting_written, chain_harmonic_enable, chain_learn} = '0;
             assign {sample_valid, sample_sin, sample_cos} = '0;
 
             wire unused = &{
-                1'b0, chain_sampled, chain_sin, chain_cos, chain_rejected, chain_phase_valid,
-                chain_plain_phase, chain_done, chain_step, chain_phase, chain_overspeed,
-                chain_disagreement, chain_overrun
+                1'b0, own_overrun, chain_sampled, chain_sin, chain_cos, chain_rejected,
+                chain_phase_valid, chain_plain_phase, chain_done, chain_step, chain_phase,
+                chain_overspeed, chain_disagreement, chain_lost
             };
         end else begin : g_shared_chain
             assign chain_setting_written = setting_written;
@@ -338,7 +343,7 @@ module feedback_channel #(
             assign {phase_valid, plain_phase} = {chain_phase_valid, chain_plain_phase};
             assign {tracked, tracked_step, tracked_phase} = {chain_done, chain_step, chain_phase};
             assign {too_fast, disagreement} = {chain_overspeed, chain_disagreement};
-            assign sample_lost = chain_overrun;
+            assign sample_lost = chain_lost;
 
             sample_hold #(
                 .W(W)
@@ -451,7 +456,7 @@ module feedback_channel #(
         wire unused_chain = &{
             1'b0, chain_sampled, chain_sin, chain_cos, chain_rejected, chain_phase_valid,
             chain_plain_phase, chain_done, chain_step, chain_phase, chain_overspeed,
-            chain_disagreement, chain_overrun
+            chain_disagreement, chain_lost
         };
         wire unused_recorder = &{1'b0, record, phases, decimation, recorder_read, disturbed};
     end

@@ -19,6 +19,7 @@ module node #(
     parameter int TICK_HZ = 4000,  // Hz, servo tick that the firmware sets
     parameter int AXES = 1,  // axes of the node, 1 to 8
     parameter int W = 8,  // bits of a sample
+    parameter int ADC_FRAME = 14,  // clocks of a conversion, at half of CLK_HZ
     parameter int FILTERS = 2,  // biquads of a servo, 0 to 4
     parameter int SEGMENTS = 0,  // most segments of a scale's table; 0: none
     parameter int HAS_SINE = 255,  // axes with sine and cosine; else counts only
@@ -146,10 +147,11 @@ module node #(
     wire [W*AXES-1:0] sample_sin, sample_cos;
     wire [32*AXES-1:0] quadrature_count;
     wire [AXES-1:0] chain_sampled, chain_rejected, chain_phase_valid, chain_done;
-    wire [AXES-1:0] chain_overspeed, chain_disagreement, chain_overrun;
+    wire [AXES-1:0] chain_overspeed, chain_disagreement, chain_lost;
     wire signed [W-1:0] chain_sin, chain_cos;
     wire [15:0] chain_plain_phase, chain_phase;
     wire signed [16:0] chain_step;
+    wire               sample_overrun;
     // interlock
     wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
 
@@ -508,6 +510,7 @@ module node #(
         interpolation_chain #(
             .AXES         (AXES),
             .W            (W),
+            .SAMPLE_CYCLES(2 * ADC_FRAME + 1),
             .HAS_HARMONICS(32'((HAS_HARMONICS & SHARED) != 0))
         ) u_chain (
             .clk,
@@ -537,13 +540,14 @@ module node #(
             .overspeed      (chain_overspeed),
             // faults
             .disagreement   (chain_disagreement),
-            .overrun        (chain_overrun)
+            .overrun        (sample_overrun),
+            .lost           (chain_lost)
         );
     end else begin : g_no_chain
         assign {chain_sampled, chain_sin, chain_cos, chain_rejected} = '0;
         assign {chain_phase_valid, chain_plain_phase} = '0;
         assign {chain_done, chain_step, chain_phase, chain_overspeed} = '0;
-        assign {chain_disagreement, chain_overrun} = '0;
+        assign {chain_disagreement, sample_overrun, chain_lost} = '0;
 
         wire unused_settings = &{1'b0, chain_setting_written, chain_harmonic_enable, chain_learn};
         wire unused_samples = &{1'b0, sample_valid, sample_sin, sample_cos, quadrature_count};
@@ -552,6 +556,7 @@ module node #(
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(
             .W                (W),
+            .ADC_FRAME        (ADC_FRAME),
             .HAS_SINE         (HAS_SINE >> n & 1),
             .HAS_OWN_CHAIN    ((HAS_SINE & HAS_OWN_CHAIN) >> n & 1),
             .HAS_MONITOR      (HAS_MONITOR >> n & 1),
@@ -590,6 +595,7 @@ module node #(
             // node
             .start                (start[n]),
             .servo_overrun,
+            .sample_overrun,
             .sync,
             .estop,
             .watchdog_expired,
@@ -652,7 +658,7 @@ module node #(
             .chain_phase,
             .chain_overspeed      (chain_overspeed[n]),
             .chain_disagreement   (chain_disagreement[n]),
-            .chain_overrun        (chain_overrun[n]),
+            .chain_lost           (chain_lost[n]),
             // pins of the machine
             .limit_low_open       (limit_low_open[n]),
             .limit_high_open      (limit_high_open[n]),

@@ -8,8 +8,10 @@
 // rate     one sample per cycle, of all axes together
 // behaviour  All axes share the arithmetic. State and settings of each axis are in LUT RAM, its
 //          harmonic tables in block RAM. The samples of each axis must be AXES cycles apart, or one
-//          may be lost, which overrun reports; see sample_arbiter. A setting is the word of its
-//          register, and acts on the samples that are served after it.
+//          may be lost; see sample_arbiter. SAMPLE_CYCLES of the converter below AXES stop the
+//          build. overrun reports a loss at once, so that the fault of the interlock comes before
+//          any event of the axis, and lost says in the next cycle whose sample it was. A setting
+//          is the word of its register, and acts on the samples that are served after it.
 // source   the chain of S0, once for a node
 // model    tb/interpolate/interpolation_chain.py, equal in every bit of every cycle
 `default_nettype none
@@ -18,6 +20,8 @@ module interpolation_chain #(
     parameter  int AXES          = 4,                            // axes that are served, 1 to 16
     parameter  int W             = 8,                            // bits of a sample, 8 to 16
     parameter  int HAS_HARMONICS = 1,                            // 1: build harmonic correction
+    // fewest cycles from a sample of an axis to its next one, as the converter gives them
+    parameter  int SAMPLE_CYCLES = AXES,
     // bits of the number of an axis
     localparam int A             = AXES == 1 ? 1 : $clog2(AXES)
 ) (
@@ -52,8 +56,13 @@ module interpolation_chain #(
     output logic        [   AXES-1:0] overspeed,        // strobes, with done: too fast
     // faults
     output logic        [   AXES-1:0] disagreement,     // levels: position against count
-    output logic        [   AXES-1:0] overrun           // strobes: a sample was lost
+    output logic                      overrun,          // strobe: a sample was lost
+    output logic        [   AXES-1:0] lost              // strobes in the next cycle: whose it was
 );
+    if (SAMPLE_CYCLES < AXES) begin : g_check_samples
+        SAMPLES_COME_TOO_FAST_FOR_THE_AXES u_error ();
+    end
+
     localparam int CORRECTED = 3;  // cycles from sampled to corrected
     localparam int FOUND = 12;  // from there to phase_valid
     localparam int STRAIGHT = HAS_HARMONICS != 0 ? 4 : 0;  // from there to straight
@@ -75,6 +84,7 @@ module interpolation_chain #(
     // samples in progress
     logic [A*CYCLES-1:0] axes;  // numbers of their axes from sampled on, the youngest at the right
     wire served, filtered, held_back, corrected, found, straight, tracked, too_fast;
+    wire [AXES-1:0] overruns;  // of each axis
     wire [A-1:0] served_axis, found_axis, straight_axis, tracked_axis;
     logic [A-1:0] filtered_axis;
     wire signed [W-1:0] served_sin, served_cos;
@@ -83,7 +93,7 @@ module interpolation_chain #(
     wire signed [31:0] tracked_count = $signed(count[32*tracked_axis+:32]);
 
     if (AXES == 1) begin : g_one
-        assign {served, served_axis, overrun} = {valid, 1'b0, 1'b0};
+        assign {served, served_axis, overruns} = {valid, 1'b0, 1'b0};
         assign {served_sin, served_cos} = {sin, cos};
     end else begin : g_many
         sample_arbiter #(
@@ -101,7 +111,7 @@ module interpolation_chain #(
             .axis   (served_axis),
             .sin_out(served_sin),
             .cos_out(served_cos),
-            .overrun
+            .overrun(overruns)
         );
     end
 
@@ -270,6 +280,7 @@ module interpolation_chain #(
     assign phase_valid   = AXES'(found) << found_axis;
     assign done          = AXES'(tracked) << tracked_axis;
     assign overspeed     = AXES'(too_fast) << tracked_axis;
+    assign overrun       = overruns != '0;
 
     always_comb begin
         written      = '0;
@@ -283,11 +294,13 @@ module interpolation_chain #(
     always_ff @(posedge clk) begin
         value         <= setting;
         filtered_axis <= served_axis;
+        lost          <= overruns;
         axes          <= {axes[A*(CYCLES-1)-1:0], filtered_axis};
         if (written[0]) outlier_known[setting_axis] <= 1'b1;
         if (written[1]) limit_known[setting_axis] <= 1'b1;
         if (rst) begin
             filtered_axis <= '0;
+            lost          <= '0;
             axes          <= '0;
             outlier_known <= '0;
             limit_known   <= '0;

@@ -57,6 +57,7 @@ module three_axes_bench (
             .watchdog_expired  (1'b0),
             .cpu_stopped       (1'b0),
             .servo_overrun     (1'b0),
+            .sample_overrun    (1'b0),
             // without a motion engine: only positions are read
             .position,
             .step_made,
@@ -103,7 +104,7 @@ module three_axes_bench (
             .chain_phase       (16'd0),
             .chain_overspeed   (1'b0),
             .chain_disagreement(1'b0),
-            .chain_overrun     (1'b0),
+            .chain_lost        (1'b0),
             .select            (select[n]),
             .write,
             .word,

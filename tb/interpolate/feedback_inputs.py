@@ -40,5 +40,5 @@ INPUTS = dict(
     chain_phase=0,
     chain_overspeed=0,
     chain_disagreement=0,
-    chain_overrun=0,
+    chain_lost=0,
 )

@@ -26,6 +26,7 @@ class Outputs(NamedTuple):
     done: tuple[int, int, int, int] | None  # axis, step, phase, overspeed
     disagreement: int
     overrun: int
+    lost: int
 
 
 class OneAxis:
@@ -55,7 +56,7 @@ class InterpolationChain:
         self.check = CountPhaseCheck(self.axes)
         # what the blocks gave in the last cycle
         self.served = self.sampled = self.corrected = self.plain = self.straight = self.done = None
-        self.loaded = None
+        self.loaded, self.overruns = None, set()
         behind = arctan_pipelined.latency(16, STEPS) + signal_correction.LATENCY
         self.axes_of_plain = deque([None] * (behind - 1))
         self.axes_of_straight = deque([None] * (harmonic_correction.LATENCY - 1))
@@ -116,10 +117,12 @@ class InterpolationChain:
             self.limits[axis] = words["limit"]
         self.served, self.sampled, self.plain, self.straight = served, sampled, plain, straight
         self.corrected, self.done, self.loaded = corrected if valid else None, done, loaded
+        late, self.overruns = sum(1 << n for n in self.overruns), lost
         if rst:
             self.reset()
-        overrun = 0 if rst else sum(1 << n for n in lost)
-        return Outputs(self.sampled, self.plain, self.done, self.check.disagreement, overrun)
+            late = 0
+        overrun, disagreement = int(bool(self.overruns)), self.check.disagreement
+        return Outputs(self.sampled, self.plain, self.done, disagreement, overrun, late)
 
 
 class OwnChain:

@@ -78,6 +78,6 @@ def test_all_axes_home_and_move_at_once_and_a_fault_stays_with_its_axis(twin):
         ended = axis.wait()
         assert ended.ended == "ok" and not ended.faults
         assert abs(ended.position_nm - (20 + 10 * n) * 1000) < 1000
-    twin.set_plant(FIRST, amplitude=0.05)
+    twin.set_plant(FIRST, signal_amplitude=0.05)
     twin.run(0.1)
     assert [bool(axis.status().faults) for axis in axes] == [True, False, False]

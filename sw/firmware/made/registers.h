@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x1698ddeau  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x9501b7ceu  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -655,16 +655,19 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_FAULTS_SERVO_OVERRUN_MASK 0x00000400u
 #define AXIS_FAULTS_SERVO_OVERRUN_SHIFT 10
 #define AXIS_FAULTS_SERVO_OVERRUN_WIDTH 1
+#define AXIS_FAULTS_SAMPLE_OVERRUN_MASK 0x00000800u
+#define AXIS_FAULTS_SAMPLE_OVERRUN_SHIFT 11
+#define AXIS_FAULTS_SAMPLE_OVERRUN_WIDTH 1
 // r: causes present now, same bits as faults
 #define AXIS_CAUSES_NOW 0x010u
-#define AXIS_CAUSES_NOW_MASK 0x000007ffu
+#define AXIS_CAUSES_NOW_MASK 0x00000fffu
 #define AXIS_CAUSES_NOW_SHIFT 0
-#define AXIS_CAUSES_NOW_WIDTH 11
+#define AXIS_CAUSES_NOW_WIDTH 12
 // r: cause that came first, same bits as faults; one bit
 #define AXIS_FIRST_FAULT 0x014u
-#define AXIS_FIRST_FAULT_MASK 0x000007ffu
+#define AXIS_FIRST_FAULT_MASK 0x00000fffu
 #define AXIS_FIRST_FAULT_SHIFT 0
-#define AXIS_FIRST_FAULT_WIDTH 11
+#define AXIS_FIRST_FAULT_WIDTH 12
 // r: position when the first fault was latched [1/65536 period]
 #define AXIS_FAULT_POSITION 0x018u
 #define AXIS_FAULT_POSITION_LOW 0x018u

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x22265732
+PROTOCOL_CRC = 0x00E8FE18
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -120,6 +120,8 @@ FAULTS = {
     8: ("profile_underrun", "the profile ran out of segments"),
     9: ("step_overrun", "too many steps are pending: too fast for the step timing, or blocked"),
     10: ("servo_overrun", "a servo tick came before the motion engine had served the last one"),
+    11: ("sample_overrun",
+         "a sample came before the shared interpolation chain had served the last one"),
 }
 
 # bit: (name, words)

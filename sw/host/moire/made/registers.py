@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x1698DDEA  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x9501B7CE  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -779,14 +779,20 @@ FIELDS = (
         "latched faults: servo overrun",
     ),
     Field(
+        "axis", "faults", "sample_overrun",
+        0x0C, 11, 1, False, "r", "",
+        Fraction(1, 1),
+        "latched faults: sample overrun",
+    ),
+    Field(
         "axis", "causes_now", "value",
-        0x10, 0, 11, False, "r", "",
+        0x10, 0, 12, False, "r", "",
         Fraction(1, 1),
         "causes present now, same bits as faults",
     ),
     Field(
         "axis", "first_fault", "value",
-        0x14, 0, 11, False, "r", "",
+        0x14, 0, 12, False, "r", "",
         Fraction(1, 1),
         "cause that came first, same bits as faults; one bit",
     ),
