@@ -2,8 +2,8 @@
 // feedback_channel -- the measuring path of an axis: from the pins of a scale to its position.
 //
 // latency  22 cycles from an ADC word to position with a chain of its own, 23 with a shared one and
-//          1 more for each axis that is served before; 5 cycles from the pins a and b to position
-//          in the mode of counts; 1 cycle more each with a segment table
+//          1 more for each axis that is served before, 30 at most for eight axes; 5 cycles from the
+//          pins a and b to position in the mode of counts; 1 cycle more each with a segment table
 // rate     one sample per `sample_tick`
 // behaviour  A feature that is not built has no logic, and the registers of its settings and its
 //          state read 0. Without HAS_OWN_CHAIN an interpolation_chain of the node computes the

@@ -3,8 +3,8 @@
 // correction, arctan, harmonic correction, tracking and count check, for several axes.
 //
 // latency  21 cycles from valid to done for one axis. With several axes 22 cycles for the axis that
-//          is served first, 1 cycle more for each axis with a lower number whose sample waits, too;
-//          4 cycles less without harmonics
+//          is served first, 1 cycle more for each axis with a lower number whose sample waits, too:
+//          21 + AXES at most; 4 cycles less without harmonics
 // rate     one sample per cycle, of all axes together
 // behaviour  All axes share the arithmetic. State and settings of each axis are in LUT RAM, its
 //          harmonic tables in block RAM. The samples of each axis must be AXES cycles apart, or one
