@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x00E8FE18u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x391503CDu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -112,7 +112,8 @@ enum bus_fault {    // bits
 
 enum bus_encoder_event {    // bits
     BUS_ENCODER_EVENT_ILLEGAL_EDGE = 1 << 0,    // both quadrature levels changed at once
-    BUS_ENCODER_EVENT_OVERSPEED = 1 << 1,    // the phase jumped: too fast, or the signal is damaged
+    // the phase jumped: too fast, the signal is damaged, or a sample was lost
+    BUS_ENCODER_EVENT_OVERSPEED = 1 << 1,
     BUS_ENCODER_EVENT_AMPLITUDE_LOW = 1 << 2,    // signal too small
     BUS_ENCODER_EVENT_AMPLITUDE_HIGH = 1 << 3,    // signal too large
     BUS_ENCODER_EVENT_DISAGREEMENT = 1 << 4,    // interpolated position and quadrature count differ

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x9501b7ceu  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x49d04e40u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -766,7 +766,8 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK 0x00000001u
 #define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_SHIFT 0
 #define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_WIDTH 1
-// phase jump: the phase is more than a quarter period away from the predicted one
+// phase jump: the phase is more than a quarter period away from the predicted one, or a sample was
+// lost
 #define AXIS_ENCODER_EVENTS_OVERSPEED_MASK 0x00000002u
 #define AXIS_ENCODER_EVENTS_OVERSPEED_SHIFT 1
 #define AXIS_ENCODER_EVENTS_OVERSPEED_WIDTH 1

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x9501B7CE  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x49D04E40  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -923,7 +923,8 @@ FIELDS = (
         "axis", "encoder_events", "overspeed",
         0x5C, 1, 1, False, "rw", "",
         Fraction(1, 1),
-        "phase jump: the phase is more than a quarter period away from the predicted one",
+        "phase jump: the phase is more than a quarter period away from the predicted one, or "
+        "a sample was lost",
     ),
     Field(
         "axis", "encoder_events", "amplitude_low",
