@@ -2,8 +2,9 @@
 // axis -- one machine axis from the pins of its scale to the pins of its motor, behind three
 // register blocks.
 //
-// latency  22 cycles from an ADC word to position, 23 with a segment table; from position at a tick
-//          to command as motion_engine has it, from target to motor steps one tick
+// latency  22 cycles from an ADC word to position, 23 with a segment table; with a shared chain as
+//          in feedback_channel; from position at a tick to command as motion_engine has it, from
+//          target to motor steps one tick
 // rate     one sample per `sample_tick`, one command per `tick`
 // behaviour  Each HAS_... parameter builds one feature. What is not built has no logic, its pins
 //          are idle, and the registers of its settings and its state read 0. `built` shows what
@@ -18,7 +19,9 @@
 module axis #(
     parameter int W = 8,  // bits of a sample
     parameter int SEGMENTS = 0,  // most segments of the scale's table; 0: no table
+    parameter int ADC_FRAME = 14,  // clocks of a conversion
     parameter int HAS_SINE = 1,  // 0: no sine and cosine, positions of counts only
+    parameter int HAS_OWN_CHAIN = HAS_SINE,  // 1: build a chain for this axis; 0: one of the node
     parameter int HAS_MONITOR = HAS_SINE,  // 1: build the signal monitor; needs the sine
     parameter int HAS_HARMONICS = HAS_SINE,  // 1: build the harmonic correction, likewise
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder of bursts, likewise
@@ -33,83 +36,105 @@ module axis #(
     parameter int HAS_DAC = HAS_DRIVE,  // 1: build the DAC
     parameter int HAS_FINE_STAGE = HAS_DAC  // 1: build the fine stage; needs the DAC
 ) (
-    input  wire         clk,
-    input  wire         rst,
+    input wire clk,
+    input wire rst,
     // register bus
-    input  wire         select,            // strobe: an access to the axis
-    input  wire         feedback_select,   // strobe: an access to its feedback channel
-    input  wire         actuator_select,   // strobe: an access to its actuator
-    input  wire         write,             // level: the access writes
-    input  wire  [ 5:0] word,              // 32-bit word of the block
-    input  wire  [31:0] wdata,             // value to write
-    input  wire  [31:0] wdata_low,         // low word of a value of 64 bits
-    output logic [31:0] rdata,             // live bits read, in the next cycle; else 0
-    output logic [31:0] feedback_rdata,    // live bits read, in the next cycle; else 0
-    output logic [31:0] actuator_rdata,    // live bits read, in the next cycle; else 0
+    input wire select,  // strobe: an access to the axis
+    input wire feedback_select,  // strobe: an access to its feedback channel
+    input wire actuator_select,  // strobe: an access to its actuator
+    input wire write,  // level: the access writes
+    input wire [5:0] word,  // 32-bit word of the block
+    input wire [31:0] wdata,  // value to write
+    input wire [31:0] wdata_low,  // low word of a value of 64 bits
+    output logic [31:0] rdata,  // live bits read, in the next cycle; else 0
+    output logic [31:0] feedback_rdata,  // live bits read, in the next cycle; else 0
+    output logic [31:0] actuator_rdata,  // live bits read, in the next cycle; else 0
     // time
-    input  wire         tick,              // strobe: servo tick
-    input  wire         sample_tick,       // strobe: take a sample
-    input  wire         limit_tick,        // strobe: an eighth of the time of a limit switch
-    input  wire  [31:0] now,               // cycles, time stamp
+    input wire tick,  // strobe: servo tick
+    input wire sample_tick,  // strobe: take a sample
+    input wire limit_tick,  // strobe: an eighth of the time of a limit switch
+    input wire [31:0] now,  // cycles, time stamp
     // node
-    input  wire         start,             // strobe: play the queued segments, with other axes
-    input  wire         servo_overrun,     // strobe: a servo tick came too soon
-    input  wire         sync,              // strobe: the sync pulse of the bus captures
-    input  wire         estop,             // level: 1 pressed
-    input  wire         watchdog_expired,  // level: the master of the bus is silent
-    input  wire         cpu_stopped,       // level: the soft core has stopped or hangs
+    input wire start,  // strobe: play the queued segments, with other axes
+    input wire servo_overrun,  // strobe: a servo tick came too soon
+    input wire sample_overrun,  // strobe: the shared chain has lost a sample
+    input wire sync,  // strobe: the sync pulse of the bus captures
+    input wire estop,  // level: 1 pressed
+    input wire watchdog_expired,  // level: the master of the bus is silent
+    input wire cpu_stopped,  // level: the soft core has stopped or hangs
     // motion_engine: what it is given
-    output logic [47:0] position,          // 2^-16 period
-    output logic        step_made,         // strobe: position moves in the next cycle
-    output logic        step_down,         // level: with step_made, it goes down
-    output logic        moves,             // level: position will jump
-    output logic        moved,             // strobe: position jumps by moved_by in the next cycle
-    output logic [47:0] moved_by,          // 2^-16 period, signed
-    output logic        block_up,          // level: no positive command passes
-    output logic        block_down,        // level: no negative command passes
-    output logic        closed_loop,       // level: the servo commands the drive
-    output logic        play,              // strobe: play the queued segments
-    output logic        arm,               // strobe: play them at start_at
-    output logic        controlled_stop,   // strobe: stop, and empty the queue
-    output logic        hold_target,       // strobe: target := position
+    output logic [47:0] position,  // 2^-16 period
+    output logic step_made,  // strobe: position moves in the next cycle
+    output logic step_down,  // level: with step_made, it goes down
+    output logic moves,  // level: position will jump
+    output logic moved,  // strobe: position jumps by moved_by in the next cycle
+    output logic [47:0] moved_by,  // 2^-16 period, signed
+    output logic block_up,  // level: no positive command passes
+    output logic block_down,  // level: no negative command passes
+    output logic closed_loop,  // level: the servo commands the drive
+    output logic play,  // strobe: play the queued segments
+    output logic arm,  // strobe: play them at start_at
+    output logic controlled_stop,  // strobe: stop, and empty the queue
+    output logic hold_target,  // strobe: target := position
     // motion_engine: its results
-    input  wire         waits,             // level: a request is not done yet
-    output logic        pending,           // level: a request is not done and shown
-    input  wire         result_valid,      // strobe: result is new, and of this axis
-    input  wire  [ 2:0] result_kind,       // number of what it is
-    input  wire  [47:0] result,            // value, signed
-    input  wire         result_flag,       // level: its flag
+    input wire waits,  // level: a request is not done yet
+    output logic pending,  // level: a request is not done and shown
+    input wire result_valid,  // strobe: result is new, and of this axis
+    input wire [2:0] result_kind,  // number of what it is
+    input wire [47:0] result,  // value, signed
+    input wire result_flag,  // level: its flag
     // step_lines
-    input  wire         line_start,        // strobe: the lines of motor steps begin
-    input  wire         line_idle,         // level: the lines have ended
-    input  wire         rate_valid,        // strobe: the rate of the next line of this axis is new
-    input  wire  [36:0] rate,              // 2^-36 motor step per cycle, signed, with rate_valid
-    input  wire         rate_restart,      // level: that line begins at a whole step
-    input  wire         rate_steep,        // level: that line is too steep
-    output logic        line_stopped,      // level: no line is followed until a restart
+    input wire line_start,  // strobe: the lines of motor steps begin
+    input wire line_idle,  // level: the lines have ended
+    input wire rate_valid,  // strobe: the rate of the next line of this axis is new
+    input wire [36:0] rate,  // 2^-36 motor step per cycle, signed, with rate_valid
+    input wire rate_restart,  // level: that line begins at a whole step
+    input wire rate_steep,  // level: that line is too steep
+    output logic line_stopped,  // level: no line is followed until a restart
     // pins of the scale
-    input  wire         encoder_a,         // pin
-    input  wire         encoder_b,         // pin
-    input  wire         encoder_z,         // pin, index
-    input  wire  [ 1:0] probe,             // pins of the touch probes
-    input  wire         adc_sin,           // pin, serial data, synchronous to adc_sclk
-    input  wire         adc_cos,           // pin, serial data, synchronous to adc_sclk
-    output logic        adc_cs_n,          // pin, low during a conversion
-    output logic        adc_sclk,          // pin, idles high
-    output logic        compare_pulse,     // pin, high during a compare pulse
+    input wire encoder_a,  // pin
+    input wire encoder_b,  // pin
+    input wire encoder_z,  // pin, index
+    input wire [1:0] probe,  // pins of the touch probes
+    input wire adc_sin,  // pin, serial data, synchronous to adc_sclk
+    input wire adc_cos,  // pin, serial data, synchronous to adc_sclk
+    output logic adc_cs_n,  // pin, low during a conversion
+    output logic adc_sclk,  // pin, idles high
+    output logic compare_pulse,  // pin, high during a compare pulse
+    // to a shared interpolation_chain, as its ports of this axis
+    output logic [7:0] chain_setting_written,  // strobes of its settings
+    output logic chain_harmonic_enable,  // level: correct the harmonics
+    output logic chain_learn,  // level: learn the count again
+    output logic sample_valid,  // strobe: a new sample
+    output logic signed [W-1:0] sample_sin,  // ADC counts, held until the next one
+    output logic signed [W-1:0] sample_cos,  // ADC counts, held until the next one
+    output logic signed [31:0] quadrature_count,  // 1/4 period
+    // from a shared interpolation_chain
+    input wire chain_sampled,  // strobe: the filtered sample is new
+    input wire signed [W-1:0] chain_sin,  // ADC counts
+    input wire signed [W-1:0] chain_cos,  // ADC counts
+    input wire chain_rejected,  // strobe: an outlier was held back
+    input wire chain_phase_valid,  // strobe: the plain phase is new
+    input wire [15:0] chain_plain_phase,  // 2^-16 period, before the harmonics
+    input wire chain_done,  // strobe: step leads to phase
+    input wire signed [16:0] chain_step,  // 2^-16 period
+    input wire [15:0] chain_phase,  // 2^-16 period, corrected
+    input wire chain_overspeed,  // strobe: the speed is too high
+    input wire chain_disagreement,  // level: position and count differ
+    input wire chain_lost,  // strobe: a sample of this axis was lost
     // pins of the machine
-    input  wire         limit_low_open,    // pin, 1: pressed or wire cut
-    input  wire         limit_high_open,   // pin, 1: pressed or wire cut
-    input  wire         drive_fault_n,     // pin, 0: the drive reports a fault
+    input wire limit_low_open,  // pin, 1: pressed or wire cut
+    input wire limit_high_open,  // pin, 1: pressed or wire cut
+    input wire drive_fault_n,  // pin, 0: the drive reports a fault
     // pins of the drive
-    output logic        bridge_a,          // pin, alone high for a positive command
-    output logic        bridge_b,          // pin, alone high for a negative command
-    output logic        step,              // pin, as step_output_mode says
-    output logic        direction,         // pin, as step_output_mode says
-    output logic        dac_cs_n,          // pin, low during a word
-    output logic        dac_sclk,          // pin, idles low
-    output logic        dac_sdi,           // pin, data of the DAC
-    output logic        drive_enable       // pin, 1: the drive may be on
+    output logic bridge_a,  // pin, alone high for a positive command
+    output logic bridge_b,  // pin, alone high for a negative command
+    output logic step,  // pin, as step_output_mode says
+    output logic direction,  // pin, as step_output_mode says
+    output logic dac_cs_n,  // pin, low during a word
+    output logic dac_sclk,  // pin, idles low
+    output logic dac_sdi,  // pin, data of the DAC
+    output logic drive_enable  // pin, 1: the drive may be on
 );
     if (HAS_DRIVE == 0 && HAS_BRIDGE + HAS_STEPPER + HAS_DAC + HAS_FINE_STAGE != 0) begin : g_check
         ACTUATORS_NEED_HAS_DRIVE u_error ();
@@ -127,8 +152,7 @@ module axis #(
     // settings of the feedback channel
     wire [5:0] deglitch;
     wire [15:0] amplitude_low, amplitude_high;
-    wire [7:0] outlier_step, outlier_hold;
-    wire        [19:0] disagreement_limit;
+    wire sensing_written, disagreement_limit_written;
     wire        [ 5:0] encoder_fault_mask;
     wire signed [31:0] shift_origin;
     wire               shift_origin_written;
@@ -139,8 +163,7 @@ module axis #(
     // measuring path
     wire signed [W-1:0] sin, cos;
     wire [15:0] phase, amplitude;
-    wire signed [31:0] quadrature_count;
-    wire        [ 5:0] encoder_events;
+    wire [5:0] encoder_events;
     wire sample_rejected, pulse_rejected, encoder_fault, position_valid, zero_up, zero_down;
     // target and command
     wire signed [47:0] target;
@@ -150,7 +173,7 @@ module axis #(
     wire moving, armed, saturated, line_up, line_down, underrun;
     wire compared, too_far, commanded;
     // interlock and drive
-    wire [10:0] faults, causes_now, first_fault;
+    wire [11:0] faults, causes_now, first_fault;
     wire signed [47:0] fault_position;
     wire downward, fine_saturated;
 
@@ -177,8 +200,10 @@ module axis #(
     );
     feedback_channel #(
         .W                (W),
+        .ADC_FRAME        (ADC_FRAME),
         .SEGMENTS         (SEGMENTS),
         .HAS_SINE         (HAS_SINE),
+        .HAS_OWN_CHAIN    (HAS_OWN_CHAIN),
         .HAS_MONITOR      (HAS_MONITOR),
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_RECORDER     (HAS_RECORDER),
@@ -202,12 +227,11 @@ module axis #(
         .now,
         // settings
         .deglitch,
-        .outlier_step,
-        .outlier_hold,
         .amplitude_low,
         .amplitude_high,
-        .disagreement_limit,
         .encoder_fault_mask,
+        .sensing_written,
+        .limit_written(disagreement_limit_written),
         .shift        (shift_origin_written),
         .shift_periods(shift_origin),
         // pins
@@ -223,6 +247,25 @@ module axis #(
         // own steps
         .own_step     (step),
         .own_downward (downward),
+        // shared chain
+        .chain_setting_written,
+        .chain_harmonic_enable,
+        .chain_learn,
+        .sample_valid,
+        .sample_sin,
+        .sample_cos,
+        .chain_sampled,
+        .chain_sin,
+        .chain_cos,
+        .chain_rejected,
+        .chain_phase_valid,
+        .chain_plain_phase,
+        .chain_done,
+        .chain_step,
+        .chain_phase,
+        .chain_overspeed,
+        .chain_disagreement,
+        .chain_lost,
         // signals
         .sin,
         .cos,
@@ -317,6 +360,7 @@ module axis #(
             .profile_underrun(underrun),
             .step_overrun,
             .servo_overrun,
+            .sample_overrun,
             // command
             .position,
             .valid_in        (commanded),
@@ -398,7 +442,7 @@ module axis #(
         };
         wire unused_causes = &{
             1'b0, estop, watchdog_expired, cpu_stopped, limit_low, limit_high, drive_fault,
-            encoder_fault, servo_overrun, underrun, too_far
+            encoder_fault, servo_overrun, sample_overrun, underrun, too_far
         };
         wire unused_motion = &{
             1'b0, line_up, line_down, compared, commanded, servo_command, line_idle, rate_valid,
@@ -407,7 +451,6 @@ module axis #(
     end
 
     axis_registers #(
-        .HAS_SINE   (HAS_SINE),
         .HAS_MONITOR(HAS_MONITOR),
         .HAS_DRIVE  (HAS_DRIVE)
     ) u_registers (
@@ -471,11 +514,10 @@ module axis #(
         .zero_crossing_down            (zero_down),
         // settings of the feedback channel
         .sensing_deglitch              (deglitch),
-        .sensing_outlier_step          (outlier_step),
-        .sensing_outlier_hold          (outlier_hold),
+        .sensing_written,
         .amplitude_window_low          (amplitude_low),
         .amplitude_window_high         (amplitude_high),
-        .disagreement_limit,
+        .disagreement_limit_written,
         // signals
         .sample_sin                    (16'(sin)),
         .sample_cos                    (16'(cos)),

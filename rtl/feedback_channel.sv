@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // feedback_channel -- the measuring path of an axis: from the pins of a scale to its position.
 //
-// latency  22 cycles from an ADC word to position, 5 cycles from the pins a and b to position in
-//          the mode of counts; 1 cycle more each with a segment table
+// latency  22 cycles from an ADC word to position with a chain of its own, 23 with a shared one and
+//          1 more for each axis that is served before, 30 at most for eight axes; 5 cycles from the
+//          pins a and b to position in the mode of counts; 1 cycle more each with a segment table
 // rate     one sample per `sample_tick`
 // behaviour  A feature that is not built has no logic, and the registers of its settings and its
-//          state read 0. Without HAS_CAPTURE only the index captures, one at a time, with its
-//          position alone: that is what homing needs. The check of
-//          the encoder is the check of counts per revolution, the count at the last index and the
-//          time of the last edge.
+//          state read 0. Without HAS_OWN_CHAIN an interpolation_chain of the node computes the
+//          steps of several axes; the ports chain_... and sample_... connect it. Without
+//          HAS_CAPTURE only the index captures, one at a time, with its position alone: that is
+//          what homing needs. The check of the encoder is the check of counts per revolution, the
+//          count at the last index and the time of the last edge.
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
@@ -16,7 +18,9 @@
 module feedback_channel #(
     parameter int W = 8,  // bits of a sample
     parameter int SEGMENTS = 0,  // most segments of the table, 3 to 255; 0: no table
+    parameter int ADC_FRAME = 14,  // clocks of a conversion
     parameter int HAS_SINE = 1,  // 0: no sine and cosine, the position is made of counts
+    parameter int HAS_OWN_CHAIN = HAS_SINE,  // 1: build a chain for this axis; 0: one of the node
     parameter int HAS_MONITOR = HAS_SINE,  // 1: build the signal monitor; needs the sine
     parameter int HAS_HARMONICS = HAS_SINE,  // 1: build the harmonic correction, likewise
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder, likewise
@@ -24,63 +28,82 @@ module feedback_channel #(
     parameter int HAS_COMPARE = 1,  // 1: build compare
     parameter int HAS_ENCODER_CHECK = 1  // 1: build the check of the encoder
 ) (
-    input  wire                 clk,
-    input  wire                 rst,
+    input wire clk,
+    input wire rst,
     // register bus
-    input  wire                 select,              // strobe: an access to this channel
-    input  wire                 write,               // level: the access writes
-    input  wire         [  5:0] word,                // 32-bit word of the block
-    input  wire         [ 31:0] wdata,               // value to write
-    input  wire         [ 31:0] wdata_low,           // low word of a value of 64 bits
-    output logic        [ 31:0] rdata,               // live bits read, in the next cycle; else 0
+    input wire select,  // strobe: an access to this channel
+    input wire write,  // level: the access writes
+    input wire [5:0] word,  // 32-bit word of the block
+    input wire [31:0] wdata,  // value to write
+    input wire [31:0] wdata_low,  // low word of a value of 64 bits
+    output logic [31:0] rdata,  // live bits read, in the next cycle; else 0
     // time
-    input  wire                 tick,                // strobe: servo tick
-    input  wire                 sample_tick,         // strobe: take a sample
-    input  wire                 sync,                // strobe: the sync pulse of the bus captures
-    input  wire         [ 31:0] now,                 // cycles, time stamp
+    input wire tick,  // strobe: servo tick
+    input wire sample_tick,  // strobe: take a sample
+    input wire sync,  // strobe: the sync pulse of the bus captures
+    input wire [31:0] now,  // cycles, time stamp
     // settings of axis_registers
-    input  wire         [  5:0] deglitch,            // samples that a, b and z must be stable
-    input  wire         [  7:0] outlier_step,        // ADC counts, largest step; 0: off
-    input  wire         [  7:0] outlier_hold,        // samples that may be held in a row
-    input  wire         [ 15:0] amplitude_low,       // ADC counts, smallest amplitude
-    input  wire         [ 15:0] amplitude_high,      // ADC counts, largest amplitude
-    input  wire         [ 19:0] disagreement_limit,  // 2^-16 period; 0: not checked
-    input  wire         [  5:0] encoder_fault_mask,  // which events are a fault, bits as in events
+    input wire [5:0] deglitch,  // samples that a, b and z must be stable
+    input wire [15:0] amplitude_low,  // ADC counts, smallest amplitude
+    input wire [15:0] amplitude_high,  // ADC counts, largest amplitude
+    input wire [5:0] encoder_fault_mask,  // which events are a fault, bits as in events
+    input wire sensing_written,  // strobe: settings of the outlier filter
+    input wire limit_written,  // strobe: limit of the count check
     // shift of the origin
-    input  wire                 shift,               // strobe: move the origin
-    input  wire signed  [ 31:0] shift_periods,       // period, distance of the shift; else 0
+    input wire shift,  // strobe: move the origin
+    input wire signed [31:0] shift_periods,  // period, distance of the shift; else 0
     // pins
-    input  wire                 a,                   // level of pin a, synchronous to clk
-    input  wire                 b,                   // level of pin b, synchronous to clk
-    input  wire                 z,                   // level of the index, synchronous to clk
-    input  wire         [  1:0] probe,               // levels of the probes, synchronous to clk
-    input  wire                 adc_sin,             // serial data, synchronous to adc_sclk
-    input  wire                 adc_cos,             // serial data, synchronous to adc_sclk
-    output logic                adc_cs_n,            // pin, low during a conversion
-    output logic                adc_sclk,            // pin, idles high
-    output logic                compare_pulse,       // pin, high during a compare pulse
+    input wire a,  // level of pin a, synchronous to clk
+    input wire b,  // level of pin b, synchronous to clk
+    input wire z,  // level of the index, synchronous to clk
+    input wire [1:0] probe,  // levels of the probes, synchronous to clk
+    input wire adc_sin,  // serial data, synchronous to adc_sclk
+    input wire adc_cos,  // serial data, synchronous to adc_sclk
+    output logic adc_cs_n,  // pin, low during a conversion
+    output logic adc_sclk,  // pin, idles high
+    output logic compare_pulse,  // pin, high during a compare pulse
     // the axis' own steps
-    input  wire                 own_step,            // level of the step output
-    input  wire                 own_downward,        // level: the next own step goes down
+    input wire own_step,  // level of the step output
+    input wire own_downward,  // level: the next own step goes down
+    // to a shared chain, as its ports of this axis
+    output logic [7:0] chain_setting_written,  // strobes of its settings
+    output logic chain_harmonic_enable,  // level: correct the harmonics
+    output logic chain_learn,  // level: learn the count again
+    output logic sample_valid,  // strobe: a new sample
+    output logic signed [W-1:0] sample_sin,  // ADC counts, held until the next one
+    output logic signed [W-1:0] sample_cos,  // ADC counts, held until the next one
+    // from a shared chain
+    input wire chain_sampled,  // strobe: the filtered sample is new
+    input wire signed [W-1:0] chain_sin,  // ADC counts
+    input wire signed [W-1:0] chain_cos,  // ADC counts
+    input wire chain_rejected,  // strobe: an outlier was held back
+    input wire chain_phase_valid,  // strobe: the plain phase is new
+    input wire [15:0] chain_plain_phase,  // 2^-16 period, before the harmonics
+    input wire chain_done,  // strobe: step leads to phase
+    input wire signed [16:0] chain_step,  // 2^-16 period
+    input wire [15:0] chain_phase,  // 2^-16 period, corrected
+    input wire chain_overspeed,  // strobe: the speed is too high
+    input wire chain_disagreement,  // level: position and count differ
+    input wire chain_lost,  // strobe: a sample of this axis was lost
     // signals
-    output logic signed [W-1:0] sin,                 // ADC counts, after the outlier filter
-    output logic signed [W-1:0] cos,                 // ADC counts, after the outlier filter
-    output logic        [ 15:0] phase,               // 2^-16 period, corrected
-    output logic        [ 15:0] amplitude,           // ADC counts
-    output logic signed [ 31:0] quadrature_count,    // 1/4 period
+    output logic signed [W-1:0] sin,  // ADC counts, after the outlier filter
+    output logic signed [W-1:0] cos,  // ADC counts, after the outlier filter
+    output logic [15:0] phase,  // 2^-16 period, corrected
+    output logic [15:0] amplitude,  // ADC counts
+    output logic signed [31:0] quadrature_count,  // 1/4 period
     // events
-    output logic                sample_rejected,     // strobe: an outlier was held back
-    output logic                pulse_rejected,      // strobe: a short pulse was filtered out
-    output logic        [  5:0] events,              // strobes, see axis_registers.encoder_events
-    output logic                encoder_fault,       // level: an enabled event or signal fault
+    output logic sample_rejected,  // strobe: an outlier was held back
+    output logic pulse_rejected,  // strobe: a short pulse was filtered out
+    output logic [5:0] events,  // strobes, see axis_registers.encoder_events
+    output logic encoder_fault,  // level: an enabled event or signal fault
     // position
-    output logic                position_valid,      // strobe: position is new
-    output logic signed [ 47:0] position,            // 2^-16 period, less the segment error
-    output logic                moved,               // strobe: position will jump by moved_by
-    output logic signed [ 47:0] moved_by,            // 2^-16 period, in the next cycle
-    output logic                moves,               // level: position will jump, with the table
-    output logic                step_made,           // strobe: position moves in the next cycle
-    output logic                step_down            // level: with step_made, it goes down
+    output logic position_valid,  // strobe: position is new
+    output logic signed [47:0] position,  // 2^-16 period, less the segment error
+    output logic moved,  // strobe: position will jump by moved_by
+    output logic signed [47:0] moved_by,  // 2^-16 period, in the next cycle
+    output logic moves,  // level: position will jump, with the table
+    output logic step_made,  // strobe: position moves in the next cycle
+    output logic step_down  // level: with step_made, it goes down
 );
     localparam int CAPTURE_DELAY = SEGMENTS == 0 ? 2 : 3;  // cycles from an index to its position
 
@@ -110,14 +133,22 @@ module feedback_channel #(
     wire [14:0] signal_fault_mask;
     wire        clear_signal_faults;
     // settings of the correction
-    wire signed [15:0] sin_offset, cos_offset;
-    wire        [16:0] gain;
-    wire signed [16:0] quadrature_error;
-    wire load_correction, harmonic_enable, harmonic_write, swap_harmonics;
-    wire        [ 7:0] harmonic_at;
-    wire signed [17:0] harmonic_value;
+    wire offset_written, gain_written, quadrature_error_written, load_correction;
+    wire harmonic_enable, harmonic_point_written, swap_harmonics;
+    wire [7:0] setting_written = {
+        swap_harmonics,
+        harmonic_point_written,
+        load_correction,
+        quadrature_error_written,
+        gain_written,
+        offset_written,
+        limit_written,
+        sensing_written
+    };
+    wire by_counts;
+    wire learn = by_counts || (shift && shift_periods == '0);
     // settings of the recorder
-    wire        [15:0] decimation;
+    wire [15:0] decimation;
     wire phases, record, recorder_read;
     // settings of the position
     wire use_counts, own_steps, align_written;
@@ -150,7 +181,7 @@ module feedback_channel #(
     wire signed [16:0] tracked_step;
     wire        [31:0] recorded;
     // position of the scale; its fraction is the phase
-    wire by_counts, convert, counted, stepped, scale_valid;
+    wire convert, counted, stepped, scale_valid;
     wire signed [16:0] counted_step, step;
     wire [15:0] counted_phase, step_phase;
     wire signed [47:0] scale_position;
@@ -234,13 +265,13 @@ module feedback_channel #(
     );
 
     if (HAS_SINE != 0) begin : g_sine
-        wire converted, sampled, corrected, phase_valid, harmonics_off;
-        wire signed [W-1:0] raw_sin, raw_cos;
-        wire signed [15:0] corrected_sin, corrected_cos;
-        wire [15:0] plain_phase, corrected_amplitude;
+        wire converted, sampled, phase_valid, too_fast, sample_lost;
+        wire signed [W-1:0] raw_sin, raw_cos, sampled_sin, sampled_cos;
+        wire [15:0] plain_phase;
 
         dual_adc_reader #(
-            .W(W)
+            .W    (W),
+            .FRAME(ADC_FRAME)
         ) u_adc (
             .clk,
             .rst,
@@ -255,106 +286,82 @@ module feedback_channel #(
             .sin    (raw_sin),
             .cos    (raw_cos)
         );
-        outlier_filter #(
-            .W(W)
-        ) u_outliers (
-            .clk,
-            .rst,
-            // settings
-            .step    (outlier_step),
-            .hold    (outlier_hold),
-            // sample
-            .valid   (converted),
-            .sin     (raw_sin),
-            .cos     (raw_cos),
-            // filtered sample
-            .done    (sampled),
-            .sin_out (sin),
-            .cos_out (cos),
-            .rejected(sample_rejected)
-        );
-        signal_correction #(
-            .W(W)
-        ) u_correction (
-            .clk,
-            .rst,
-            // settings
-            .load   (load_correction),
-            .sin_offset,
-            .cos_offset,
-            .gain,
-            .quadrature_error,
-            // sample
-            .valid  (sampled),
-            .sin,
-            .cos,
-            // corrected sample
-            .done   (corrected),
-            .sin_out(corrected_sin),
-            .cos_out(corrected_cos)
-        );
-        arctan_pipelined #(
-            .W    (16),
-            .STEPS(2)
-        ) u_arctan (
-            .clk,
-            .rst,
-            // corrected sample
-            .valid    (corrected),
-            .sin      (corrected_sin),
-            .cos      (corrected_cos),
-            // phase
-            .done     (phase_valid),
-            .phase    (plain_phase),
-            .amplitude(corrected_amplitude)
-        );
-        if (HAS_HARMONICS != 0) begin : g_harmonics
-            harmonic_correction u_harmonics (
+        if (HAS_OWN_CHAIN != 0) begin : g_own_chain
+            wire own_overrun;  // never: one axis has nothing to wait for
+
+            interpolation_chain #(
+                .AXES         (1),
+                .W            (W),
+                .HAS_HARMONICS(HAS_HARMONICS)
+            ) u_chain (
                 .clk,
                 .rst,
-                // table
-                .enable   (harmonic_enable),
-                .write    (harmonic_write),
-                .point    (harmonic_at),
-                .value    (harmonic_value),
-                .swap     (swap_harmonics),
-                // phase
-                .valid    (phase_valid),
-                .phase    (plain_phase),
-                // corrected phase
-                .done     (harmonics_off),
-                .phase_out(phase)
+                // settings
+                .setting  (wdata),
+                .setting_written,
+                .harmonic_enable,
+                .learn,
+                // sample and count
+                .valid    (converted),
+                .sin      (raw_sin),
+                .cos      (raw_cos),
+                .count    (quadrature_count),
+                // filtered sample
+                .sampled,
+                .sampled_sin,
+                .sampled_cos,
+                .rejected (sample_rejected),
+                // phase before the harmonic correction
+                .phase_valid,
+                .plain_phase,
+                // step of the position
+                .done     (tracked),
+                .step     (tracked_step),
+                .phase    (tracked_phase),
+                .overspeed(too_fast),
+                // faults
+                .disagreement,
+                .overrun  (own_overrun),
+                .lost     (sample_lost)
             );
-        end else begin : g_no_harmonics
-            assign {harmonics_off, phase} = {phase_valid, plain_phase};
+            assign {sin, cos, phase} = {sampled_sin, sampled_cos, tracked_phase};
+            assign {chain_setting_written, chain_harmonic_enable, chain_learn} = '0;
+            assign {sample_valid, sample_sin, sample_cos} = '0;
+
             wire unused = &{
-                1'b0, harmonic_enable, harmonic_write, harmonic_at, harmonic_value, swap_harmonics
+                1'b0, own_overrun, chain_sampled, chain_sin, chain_cos, chain_rejected,
+                chain_phase_valid, chain_plain_phase, chain_done, chain_step, chain_phase,
+                chain_overspeed, chain_disagreement, chain_lost
             };
+        end else begin : g_shared_chain
+            assign chain_setting_written = setting_written;
+            assign chain_harmonic_enable = harmonic_enable;
+            assign chain_learn = learn;
+            assign {sample_valid, sample_sin, sample_cos} = {converted, raw_sin, raw_cos};
+            assign {sampled, sampled_sin, sampled_cos} = {chain_sampled, chain_sin, chain_cos};
+            assign sample_rejected = chain_rejected;
+            assign {phase_valid, plain_phase} = {chain_phase_valid, chain_plain_phase};
+            assign {tracked, tracked_step, tracked_phase} = {chain_done, chain_step, chain_phase};
+            assign {too_fast, disagreement} = {chain_overspeed, chain_disagreement};
+            assign sample_lost = chain_lost;
+
+            sample_hold #(
+                .W(W)
+            ) u_hold (
+                .clk,
+                // from the chain
+                .sampled,
+                .sampled_sin,
+                .sampled_cos,
+                .tracked,
+                .tracked_phase,
+                // last values of this axis
+                .sin,
+                .cos,
+                .phase
+            );
         end
-        fringe_tracker u_tracker (
-            .clk,
-            .rst,
-            // phase
-            .valid    (harmonics_off),
-            .phase,
-            // step
-            .done     (tracked),
-            .step     (tracked_step),
-            .phase_out(tracked_phase),
-            .overspeed
-        );
-        count_phase_check u_count_phase_check (
-            .clk,
-            .rst,
-            .limit   (disagreement_limit),
-            // both positions
-            .valid   (scale_valid),
-            .position(scale_position),
-            .count   (quadrature_count),
-            .shift,
-            .shift_periods,
-            .disagreement
-        );
+        assign overspeed = too_fast || sample_lost;
         if (HAS_MONITOR != 0) begin : g_monitor
             wire ready;
 
@@ -379,8 +386,8 @@ module feedback_channel #(
                 .quadrature_limit,
                 // signals
                 .valid     (sampled),
-                .sin,
-                .cos,
+                .sin       (sampled_sin),
+                .cos       (sampled_cos),
                 .a         (levels[0]),
                 .b         (levels[1]),
                 .phase_jump(overspeed),
@@ -396,7 +403,7 @@ module feedback_channel #(
         end else begin : g_no_monitor
             assign {amplitude, signal_faults, first_signal_faults} = '0;
 
-            wire unused_axis = &{1'b0, amplitude_low, amplitude_high};
+            wire unused_axis = &{1'b0, amplitude_low, amplitude_high, sampled};
             wire unused_limits = &{
                 1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
                 offset_limit, balance_limit, quadrature_limit, clear_signal_faults, levels[1:0]
@@ -427,28 +434,29 @@ module feedback_channel #(
             );
         end else begin : g_no_recorder
             assign {recorded, full, invalid} = '0;
-            wire unused = &{1'b0, record, phases, decimation, recorder_read, disturbed};
+            wire unused_settings = &{1'b0, record, phases, decimation, recorder_read};
+            wire unused_signals = &{1'b0, disturbed, phase_valid, plain_phase};
         end
-
-        wire unused = &{1'b0, corrected_amplitude};
     end else begin : g_no_sine
         assign {adc_cs_n, adc_sclk} = 2'b11;
         assign {sin, cos, phase, amplitude} = '0;
         assign {sample_rejected, overspeed, disagreement, signal_faults, first_signal_faults} = '0;
         assign {tracked, tracked_step, tracked_phase} = '0;
         assign {recorded, full, invalid} = '0;
+        assign {chain_setting_written, chain_harmonic_enable, chain_learn} = '0;
+        assign {sample_valid, sample_sin, sample_cos} = '0;
 
         wire unused_pins = &{1'b0, adc_sin, adc_cos, convert, levels[1:0]};
-        wire unused_axis = &{
-            1'b0, outlier_step, outlier_hold, amplitude_low, amplitude_high, disagreement_limit
-        };
+        wire unused_axis = &{1'b0, amplitude_low, amplitude_high};
         wire unused_limits = &{
             1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
             offset_limit, balance_limit, quadrature_limit, clear_signal_faults
         };
-        wire unused_correction = &{
-            1'b0, load_correction, sin_offset, cos_offset, gain, quadrature_error,
-            harmonic_enable, harmonic_write, harmonic_at, harmonic_value, swap_harmonics
+        wire unused_correction = &{1'b0, setting_written, harmonic_enable, learn};
+        wire unused_chain = &{
+            1'b0, chain_sampled, chain_sin, chain_cos, chain_rejected, chain_phase_valid,
+            chain_plain_phase, chain_done, chain_step, chain_phase, chain_overspeed,
+            chain_disagreement, chain_lost
         };
         wire unused_recorder = &{1'b0, record, phases, decimation, recorder_read, disturbed};
     end
@@ -664,7 +672,6 @@ module feedback_channel #(
     end
 
     feedback_registers #(
-        .HAS_SINE         (HAS_SINE),
         .HAS_MONITOR      (HAS_MONITOR),
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_RECORDER     (HAS_RECORDER),
@@ -681,68 +688,65 @@ module feedback_channel #(
         .wdata_low,
         .rdata,
         // edges and index
-        .edge_filter_skip                  (filter_skip),
-        .edge_filter_tolerated             (filter_tolerated),
-        .decoder_mode                      (mode),
-        .index_active_low                  (index_low),
-        .index_gate_mask                   (gate_mask),
-        .index_gate                        (gate),
+        .edge_filter_skip                   (filter_skip),
+        .edge_filter_tolerated              (filter_tolerated),
+        .decoder_mode                       (mode),
+        .index_active_low                   (index_low),
+        .index_gate_mask                    (gate_mask),
+        .index_gate                         (gate),
         .index_up,
         .index_down,
         .index_each,
         .counts_per_revolution,
         // strobes
-        .strobes_arm_index                 (arm_index),
-        .strobes_load_correction           (load_correction),
-        .strobes_swap_harmonics            (swap_harmonics),
-        .strobes_record                    (record),
-        .strobes_clear_signal_faults       (clear_signal_faults),
-        .strobes_capture_now               (capture_now),
-        .strobes_capture_next              (capture_next),
-        .strobes_capture_clear             (capture_clear),
-        .strobes_compare_arm               (compare_arm),
-        .strobes_compare_disarm            (compare_disarm),
+        .strobes_arm_index                  (arm_index),
+        .strobes_load_correction            (load_correction),
+        .strobes_swap_harmonics             (swap_harmonics),
+        .strobes_record                     (record),
+        .strobes_clear_signal_faults        (clear_signal_faults),
+        .strobes_capture_now                (capture_now),
+        .strobes_capture_next               (capture_next),
+        .strobes_capture_clear              (capture_clear),
+        .strobes_compare_arm                (compare_arm),
+        .strobes_compare_disarm             (compare_disarm),
         // index events
-        .index_events_found                (index_found),
-        .index_events_revolution_wrong     (revolution_wrong),
-        .index_events_armed                (index_armed),
-        .index_count                       (HAS_ENCODER_CHECK != 0 ? index_count : 32'sd0),
-        .edge_time                         (HAS_ENCODER_CHECK != 0 ? edge_time : 32'd0),
+        .index_events_found                 (index_found),
+        .index_events_revolution_wrong      (revolution_wrong),
+        .index_events_armed                 (index_armed),
+        .index_count                        (HAS_ENCODER_CHECK != 0 ? index_count : 32'sd0),
+        .edge_time                          (HAS_ENCODER_CHECK != 0 ? edge_time : 32'd0),
         // correction
-        .correction_offset_sin             (sin_offset),
-        .correction_offset_cos             (cos_offset),
-        .correction_gain                   (gain),
-        .correction_quadrature_error       (quadrature_error),
+        .correction_offset_written          (offset_written),
+        .correction_gain_written            (gain_written),
+        .correction_quadrature_error_written(quadrature_error_written),
         .harmonic_enable,
-        .harmonic_point                    (harmonic_value),
-        .harmonic_point_point              (harmonic_at),
-        .harmonic_point_written            (harmonic_write),
+        .harmonic_point_written,
         // recorder
-        .recorder_decimation               (decimation),
-        .recorder_phases                   (phases),
-        .recorder_state_full               (full),
-        .recorder_state_invalid            (invalid),
-        .recorder_word                     (recorded),
-        .recorder_word_read                (recorder_read),
+        .recorder_decimation                (decimation),
+        .recorder_phases                    (phases),
+        .recorder_state_full                (full),
+        .recorder_state_invalid             (invalid),
+        .recorder_word                      (recorded),
+        .recorder_word_read                 (recorder_read),
         // signal monitor
         .signal_faults,
         .first_signal_faults,
         .signal_fault_mask,
-        .lissajous_limits_clip_level       (clip_level),
-        .lissajous_limits_tolerance        (tolerance),
-        .jump_limits_jump                  (jump),
-        .jump_limits_no_noise_samples      (no_noise_samples),
-        .channel_limits_span               (span),
-        .channel_limits_band               (band),
-        .drift_limits_offset               (offset_limit),
-        .drift_limits_balance              (balance_limit),
-        .quadrature_limits_quadrature_error(quadrature_limit),
-        .quadrature_limits_sign_threshold  (sign_threshold),
+        .lissajous_limits_clip_level        (clip_level),
+        .lissajous_limits_tolerance         (tolerance),
+        .jump_limits_jump                   (jump),
+        .jump_limits_no_noise_samples       (no_noise_samples),
+        .channel_limits_span                (span),
+        .channel_limits_band                (band),
+        .drift_limits_offset                (offset_limit),
+        .drift_limits_balance               (balance_limit),
+        .quadrature_limits_quadrature_error (quadrature_limit),
+        .quadrature_limits_sign_threshold   (sign_threshold),
         // capture
         .capture_sources,
-        .capture_state_present             (present),
-        .capture_state_free                (capture_free),
-        .capture_state_overrun             (overrun),
+        .capture_state_present              (present),
+        .capture_state_free                 (capture_free),
+        .capture_state_overrun              (overrun),
         .captured_sources,
         .captured_age,
         .captured_time,
@@ -751,31 +755,31 @@ module feedback_channel #(
         .compare_start,
         .compare_step,
         .compare_count,
-        .compare_pulse                     (pulse_length),
-        .compare_gap                       (gap_length),
-        .compare_state_armed               (armed),
-        .compare_state_late                (late),
-        .compare_passed                    (passed),
+        .compare_pulse                      (pulse_length),
+        .compare_gap                        (gap_length),
+        .compare_state_armed                (armed),
+        .compare_state_late                 (late),
+        .compare_passed                     (passed),
         // source of the position
-        .position_source_counts            (use_counts),
-        .position_source_steps             (own_steps),
+        .position_source_counts             (use_counts),
+        .position_source_steps              (own_steps),
         .align,
         .align_written,
         // segment table
-        .segment_use_enable                (segment_enable),
-        .segment_use_linear                (segment_linear),
-        .segment_use_segments              (segments),
-        .segment_state_in_force            (segment_in_force),
-        .segment_state_outside             (segment_outside),
-        .segment_state_known               (segment_known),
+        .segment_use_enable                 (segment_enable),
+        .segment_use_linear                 (segment_linear),
+        .segment_use_segments               (segments),
+        .segment_state_in_force             (segment_in_force),
+        .segment_state_outside              (segment_outside),
+        .segment_state_known                (segment_known),
         .segment_origin,
         .segment_origin_written,
         .segment_length,
         .segment_point,
-        .segment_point_border              (segment_border),
+        .segment_point_border               (segment_border),
         .segment_point_written,
-        .segment_read_border               (segment_read_point),
-        .segment_read_written              (segment_read),
+        .segment_read_border                (segment_read_point),
+        .segment_read_written               (segment_read),
         .segment_stored,
         .segment_error
     );

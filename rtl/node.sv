@@ -15,35 +15,39 @@
 `default_nettype none
 
 module node #(
-    parameter int CLK_HZ            = 4_000_000,  // Hz, clk frequency
-    parameter int TICK_HZ           = 4000,       // Hz, servo tick that the firmware sets
-    parameter int AXES              = 1,          // axes of the node, 1 to 8
-    parameter int W                 = 8,          // bits of a sample
-    parameter int FILTERS           = 2,          // biquads of a servo, 0 to 4
-    parameter int SEGMENTS          = 0,          // most segments of a scale's table; 0: none
-    parameter int HAS_SINE          = 255,        // axes with sine and cosine; else counts only
-    parameter int HAS_MONITOR       = HAS_SINE,   // axes with a signal monitor, needs the sine
-    parameter int HAS_HARMONICS     = HAS_SINE,   // axes with harmonic correction, needs the sine
-    parameter int HAS_RECORDER      = HAS_SINE,   // axes with a recorder of bursts, needs the sine
-    parameter int HAS_SEGMENTS      = 255,        // axes with a table of SEGMENTS segments
-    parameter int HAS_CAPTURE       = 255,        // axes with a queue of captures
-    parameter int HAS_COMPARE       = 255,        // axes with compare
-    parameter int HAS_ENCODER_CHECK = 255,        // axes with the check of the encoder
-    parameter int HAS_VELOCITY      = 255,        // axes of which the engine has the velocity
-    parameter int HAS_DRIVE         = 255,        // axes with a drive; the others only measure
-    parameter int HAS_FILTERS       = HAS_DRIVE,  // axes with FILTERS biquads, needs the drive
-    parameter int HAS_BRIDGE        = HAS_DRIVE,  // axes with a bridge, needs the drive
-    parameter int HAS_STEPPER       = HAS_DRIVE,  // axes with a step generator, needs the drive
-    parameter int HAS_DAC           = HAS_DRIVE,  // axes with a DAC, needs the drive
-    parameter int HAS_FINE_STAGE    = HAS_DAC,    // axes with a fine stage, needs the DAC
-    parameter int HAS_I2C           = 0,          // 1: build the I2C master
-    parameter int HAS_PS2           = 0,          // 1: build the PS/2 pass-through
-    parameter int HAS_PEER          = 0,          // 1: build the peer port
-    parameter int HAS_ANGLE_SENSOR  = 0,          // 1: build the receiver of the angle sensor
-    parameter int HAS_DISPLAY       = 0,          // 1: build the numeric display
-    parameter int HAS_STATUS_INPUTS = 0,          // 1: build the status inputs
-    parameter int MEMORY_BYTES      = 98304,      // bytes of the soft core, program and data
-    parameter     FIRMWARE          = ""          // file of its contents at power-up
+    parameter int CLK_HZ = 4_000_000,  // Hz, clk frequency
+    parameter int TICK_HZ = 4000,  // Hz, servo tick that the firmware sets
+    parameter int AXES = 1,  // axes of the node, 1 to 8
+    parameter int W = 8,  // bits of a sample
+    parameter int ADC_FRAME = 14,  // clocks of a conversion, at half of CLK_HZ
+    parameter int FILTERS = 2,  // biquads of a servo, 0 to 4
+    parameter int SEGMENTS = 0,  // most segments of a scale's table; 0: none
+    parameter int HAS_SINE = 255,  // axes with sine and cosine; else counts only
+    // axes with an interpolation chain of their own, the other sine axes share one; by default a
+    // single sine axis has its own
+    parameter int HAS_OWN_CHAIN = (HAS_SINE & (HAS_SINE - 1)) % (1 << AXES) == 0 ? 255 : 0,
+    parameter int HAS_MONITOR = HAS_SINE,  // axes with a signal monitor, needs the sine
+    parameter int HAS_HARMONICS = HAS_SINE,  // axes with harmonic correction, needs the sine
+    parameter int HAS_RECORDER = HAS_SINE,  // axes with a recorder of bursts, needs the sine
+    parameter int HAS_SEGMENTS = 255,  // axes with a table of SEGMENTS segments
+    parameter int HAS_CAPTURE = 255,  // axes with a queue of captures
+    parameter int HAS_COMPARE = 255,  // axes with compare
+    parameter int HAS_ENCODER_CHECK = 255,  // axes with the check of the encoder
+    parameter int HAS_VELOCITY = 255,  // axes of which the engine has the velocity
+    parameter int HAS_DRIVE = 255,  // axes with a drive; the others only measure
+    parameter int HAS_FILTERS = HAS_DRIVE,  // axes with FILTERS biquads, needs the drive
+    parameter int HAS_BRIDGE = HAS_DRIVE,  // axes with a bridge, needs the drive
+    parameter int HAS_STEPPER = HAS_DRIVE,  // axes with a step generator, needs the drive
+    parameter int HAS_DAC = HAS_DRIVE,  // axes with a DAC, needs the drive
+    parameter int HAS_FINE_STAGE = HAS_DAC,  // axes with a fine stage, needs the DAC
+    parameter int HAS_I2C = 0,  // 1: build the I2C master
+    parameter int HAS_PS2 = 0,  // 1: build the PS/2 pass-through
+    parameter int HAS_PEER = 0,  // 1: build the peer port
+    parameter int HAS_ANGLE_SENSOR = 0,  // 1: build the receiver of the angle sensor
+    parameter int HAS_DISPLAY = 0,  // 1: build the numeric display
+    parameter int HAS_STATUS_INPUTS = 0,  // 1: build the status inputs
+    parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
+    parameter FIRMWARE = ""  // file of its contents at power-up
 ) (
     input  wire               clk,
     input  wire               rst,
@@ -136,6 +140,18 @@ module node #(
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;
     wire signed [36:0] rate;
+    // interpolation chain that sine axes share
+    localparam int SHARED = HAS_SINE % (1 << AXES) & ~HAS_OWN_CHAIN;
+    wire [8*AXES-1:0] chain_setting_written;
+    wire [AXES-1:0] chain_harmonic_enable, chain_learn, sample_valid;
+    wire [W*AXES-1:0] sample_sin, sample_cos;
+    wire [32*AXES-1:0] quadrature_count;
+    wire [AXES-1:0] chain_sampled, chain_rejected, chain_phase_valid, chain_done;
+    wire [AXES-1:0] chain_overspeed, chain_disagreement, chain_lost;
+    wire signed [W-1:0] chain_sin, chain_cos;
+    wire [15:0] chain_plain_phase, chain_phase;
+    wire signed [16:0] chain_step;
+    wire               sample_overrun;
     // interlock
     wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
 
@@ -490,10 +506,59 @@ module node #(
         wire unused = &{1'b0, line_stopped};
     end
 
+    if (SHARED != 0) begin : g_chain
+        interpolation_chain #(
+            .AXES         (AXES),
+            .W            (W),
+            .SAMPLE_CYCLES(2 * ADC_FRAME + 1),
+            .HAS_HARMONICS(32'((HAS_HARMONICS & SHARED) != 0))
+        ) u_chain (
+            .clk,
+            .rst,
+            // settings
+            .setting        (wdata),
+            .setting_written(chain_setting_written),
+            .harmonic_enable(chain_harmonic_enable),
+            .learn          (chain_learn),
+            // samples and counts
+            .valid          (sample_valid),
+            .sin            (sample_sin),
+            .cos            (sample_cos),
+            .count          (quadrature_count),
+            // filtered sample
+            .sampled        (chain_sampled),
+            .sampled_sin    (chain_sin),
+            .sampled_cos    (chain_cos),
+            .rejected       (chain_rejected),
+            // phase before the harmonic correction
+            .phase_valid    (chain_phase_valid),
+            .plain_phase    (chain_plain_phase),
+            // step of the position
+            .done           (chain_done),
+            .step           (chain_step),
+            .phase          (chain_phase),
+            .overspeed      (chain_overspeed),
+            // faults
+            .disagreement   (chain_disagreement),
+            .overrun        (sample_overrun),
+            .lost           (chain_lost)
+        );
+    end else begin : g_no_chain
+        assign {chain_sampled, chain_sin, chain_cos, chain_rejected} = '0;
+        assign {chain_phase_valid, chain_plain_phase} = '0;
+        assign {chain_done, chain_step, chain_phase, chain_overspeed} = '0;
+        assign {chain_disagreement, sample_overrun, chain_lost} = '0;
+
+        wire unused_settings = &{1'b0, chain_setting_written, chain_harmonic_enable, chain_learn};
+        wire unused_samples = &{1'b0, sample_valid, sample_sin, sample_cos, quadrature_count};
+    end
+
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(
             .W                (W),
+            .ADC_FRAME        (ADC_FRAME),
             .HAS_SINE         (HAS_SINE >> n & 1),
+            .HAS_OWN_CHAIN    ((HAS_SINE & HAS_OWN_CHAIN) >> n & 1),
             .HAS_MONITOR      (HAS_MONITOR >> n & 1),
             .HAS_HARMONICS    (HAS_HARMONICS >> n & 1),
             .HAS_RECORDER     (HAS_RECORDER >> n & 1),
@@ -512,80 +577,101 @@ module node #(
             .clk,
             .rst,
             // register bus
-            .select         (axis_select[n]),
-            .feedback_select(feedback_select[n]),
-            .actuator_select(actuator_select[n]),
+            .select               (axis_select[n]),
+            .feedback_select      (feedback_select[n]),
+            .actuator_select      (actuator_select[n]),
             .write,
             .word,
             .wdata,
             .wdata_low,
-            .rdata          (axis_rdata[32*n+:32]),
-            .feedback_rdata (feedback_rdata[32*n+:32]),
-            .actuator_rdata (actuator_rdata[32*n+:32]),
+            .rdata                (axis_rdata[32*n+:32]),
+            .feedback_rdata       (feedback_rdata[32*n+:32]),
+            .actuator_rdata       (actuator_rdata[32*n+:32]),
             // time
             .tick,
             .sample_tick,
             .limit_tick,
-            .now            (now[31:0]),
+            .now                  (now[31:0]),
             // node
-            .start          (start[n]),
+            .start                (start[n]),
             .servo_overrun,
+            .sample_overrun,
             .sync,
             .estop,
             .watchdog_expired,
             .cpu_stopped,
             // motion_engine: what it is given
-            .position       (position[48*n+:48]),
-            .step_made      (step_made[n]),
-            .step_down      (step_down[n]),
-            .moves          (moves[n]),
-            .moved          (moved[n]),
-            .moved_by       (moved_by[48*n+:48]),
-            .block_up       (block_up[n]),
-            .block_down     (block_down[n]),
-            .closed_loop    (closed_loop[n]),
-            .play           (play[n]),
-            .arm            (arm[n]),
-            .controlled_stop(controlled_stop[n]),
-            .hold_target    (hold_target[n]),
+            .position             (position[48*n+:48]),
+            .step_made            (step_made[n]),
+            .step_down            (step_down[n]),
+            .moves                (moves[n]),
+            .moved                (moved[n]),
+            .moved_by             (moved_by[48*n+:48]),
+            .block_up             (block_up[n]),
+            .block_down           (block_down[n]),
+            .closed_loop          (closed_loop[n]),
+            .play                 (play[n]),
+            .arm                  (arm[n]),
+            .controlled_stop      (controlled_stop[n]),
+            .hold_target          (hold_target[n]),
             // motion_engine: its results
-            .waits          (request_waits[n]),
-            .pending        (pending[n]),
-            .result_valid   (result_valid && result_axis == 3'(n)),
+            .waits                (request_waits[n]),
+            .pending              (pending[n]),
+            .result_valid         (result_valid && result_axis == 3'(n)),
             .result_kind,
             .result,
             .result_flag,
             // step_lines
             .line_start,
             .line_idle,
-            .rate_valid     (rate_valid[n]),
+            .rate_valid           (rate_valid[n]),
             .rate,
             .rate_restart,
             .rate_steep,
-            .line_stopped   (line_stopped[n]),
+            .line_stopped         (line_stopped[n]),
             // pins of the scale
-            .encoder_a      (encoder_a[n]),
-            .encoder_b      (encoder_b[n]),
-            .encoder_z      (encoder_z[n]),
-            .probe          (probe[2*n+:2]),
-            .adc_sin        (adc_sin[n]),
-            .adc_cos        (adc_cos[n]),
-            .adc_cs_n       (adc_cs_n[n]),
-            .adc_sclk       (adc_sclk[n]),
-            .compare_pulse  (compare_pulse[n]),
+            .encoder_a            (encoder_a[n]),
+            .encoder_b            (encoder_b[n]),
+            .encoder_z            (encoder_z[n]),
+            .probe                (probe[2*n+:2]),
+            .adc_sin              (adc_sin[n]),
+            .adc_cos              (adc_cos[n]),
+            .adc_cs_n             (adc_cs_n[n]),
+            .adc_sclk             (adc_sclk[n]),
+            .compare_pulse        (compare_pulse[n]),
+            // shared chain
+            .chain_setting_written(chain_setting_written[8*n+:8]),
+            .chain_harmonic_enable(chain_harmonic_enable[n]),
+            .chain_learn          (chain_learn[n]),
+            .sample_valid         (sample_valid[n]),
+            .sample_sin           (sample_sin[W*n+:W]),
+            .sample_cos           (sample_cos[W*n+:W]),
+            .quadrature_count     (quadrature_count[32*n+:32]),
+            .chain_sampled        (chain_sampled[n]),
+            .chain_sin,
+            .chain_cos,
+            .chain_rejected       (chain_rejected[n]),
+            .chain_phase_valid    (chain_phase_valid[n]),
+            .chain_plain_phase,
+            .chain_done           (chain_done[n]),
+            .chain_step,
+            .chain_phase,
+            .chain_overspeed      (chain_overspeed[n]),
+            .chain_disagreement   (chain_disagreement[n]),
+            .chain_lost           (chain_lost[n]),
             // pins of the machine
-            .limit_low_open (limit_low_open[n]),
-            .limit_high_open(limit_high_open[n]),
-            .drive_fault_n  (drive_fault_n[n]),
+            .limit_low_open       (limit_low_open[n]),
+            .limit_high_open      (limit_high_open[n]),
+            .drive_fault_n        (drive_fault_n[n]),
             // pins of the drive
-            .bridge_a       (bridge_a[n]),
-            .bridge_b       (bridge_b[n]),
-            .step           (step[n]),
-            .direction      (direction[n]),
-            .dac_cs_n       (dac_cs_n[n]),
-            .dac_sclk       (dac_sclk[n]),
-            .dac_sdi        (dac_sdi[n]),
-            .drive_enable   (drive_enable[n])
+            .bridge_a             (bridge_a[n]),
+            .bridge_b             (bridge_b[n]),
+            .step                 (step[n]),
+            .direction            (direction[n]),
+            .dac_cs_n             (dac_cs_n[n]),
+            .dac_sclk             (dac_sclk[n]),
+            .dac_sdi              (dac_sdi[n]),
+            .drive_enable         (drive_enable[n])
         );
     end
 

@@ -63,8 +63,9 @@ class Field:
     lsb: str
     text: str  # its own words, or none
     meaning: str  # its own words, or those of the register with its name
-    on_write: bool  # swmod: a strobe follows a write
+    on_write: bool  # swmod or passed: a strobe follows a write
     on_read: bool  # swacc: a strobe goes with a read
+    passed: bool  # a setting that its block does not hold
     momentary: bool  # its port is 0 in all cycles but that of the strobe of a write
     needs: str  # parameter of the block without which a setting has no bits and reads 0
     signal: str  # its port in the block; a bit of the register's port in a vector
@@ -211,8 +212,8 @@ class Block:
 
     @property
     def parameters(self) -> list[str]:
-        """Those of the block itself."""
-        return sorted({f.needs for _, f in self.own_fields if f.needs})
+        """Those that decide which settings the block itself holds."""
+        return sorted({f.needs for _, f in self.own_fields if f.needs and not f.passed})
 
     @property
     def wide_settings(self) -> list[Register]:
@@ -222,7 +223,7 @@ class Block:
     def unused(self) -> int:
         """The lowest bit of wdata that no register of this block has; all above are unused too."""
         taken = ("setting", "pulse", "sticky")
-        fields = [(r, f) for r, f in self.own_fields if f.kind in taken]
+        fields = [(r, f) for r, f in self.own_fields if f.kind in taken and not f.passed]
         return max((f.low + f.width - 32 * r.wide for r, f in fields), default=0)
 
     @property
@@ -362,6 +363,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
     kind, sw = kind_of(get, name), get("sw").name
     wide, vector = register.get_property("regwidth") == 64, bool(register.get_property("vector"))
     needs = get("needs") or register.get_property("needs") or ""
+    passed = bool(get("passed") or register.get_property("passed"))
     unknown = {"onread", "hwclr", "we", "wel", "sticky", "stickybit", "decr"}
     text, words = described(node), described(register)
     port = parent if name == "value" else f"{parent}_{name}"
@@ -375,7 +377,11 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         (get("swacc") and "r" not in sw, "swacc is only for what software reads"),
         (get("swmod") and kind != "setting", "swmod is only for what software sets"),
         (needs and kind != "setting", "only a setting may need a parameter"),
-        (get("momentary") and (wide or needs or not get("swmod")), "momentary is for swmod alone"),
+        (passed and (kind != "setting" or wide), "only a setting of 32 bits may be passed"),
+        (
+            get("momentary") and (wide or needs or passed or not get("swmod")),
+            "momentary is for swmod alone",
+        ),
         (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
         (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
         (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),
@@ -397,8 +403,9 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         lsb=get("lsb") or "",
         text=text,
         meaning=text or (words if name == "value" else f"{words}: {name.replace('_', ' ')}"),
-        on_write=bool(get("swmod")),
+        on_write=bool(get("swmod")) or passed,
         on_read=bool(get("swacc")),
+        passed=passed,
         momentary=bool(get("momentary")),
         needs=needs,
         signal=signal,
@@ -473,7 +480,7 @@ def ports(r: Register) -> list[tuple[str, str, str, list[str]]]:
         texts = [f"strobe: {t}" for t in texts] + ["strobe"] if strobe else texts
         texts += [f.measure, clause(f.meaning)] if f.unit else []
         out = f.kind in ("setting", "pulse")
-        if f.kind != "constant":
+        if f.kind != "constant" and not f.passed:
             shape = "" if strobe else f.shape
             found.append(("output logic" if out else "input  wire ", shape, f.port, texts))
     strobes = (("written", r.on_write, "new value"), ("read", r.on_read, "read in this cycle"))

@@ -11,6 +11,7 @@
 //          period per sample; proved there). At a second outlier in a row, or a step of a period
 //          or more, the nearest step is taken, and tracking continues from there as from
 //          standstill; whole periods may then be lost, which overspeed reports.
+// behaviour  With AXES above 1 it serves several axes, each with its own last phase and speed.
 // source   S0 limit filter 2 (a count is compared with its predecessor), with the speed added to
 //          the prediction
 // model    tb/interpolate/fringe_tracker.py, equal in every bit of every cycle
@@ -20,66 +21,83 @@
 // proof    depth 6
 `default_nettype none
 
-module fringe_tracker (
-    input  wire                clk,
-    input  wire                rst,        // level: the phase is forgotten; the next one has step 0
-    input  wire                valid,      // strobe: phase is new
-    input  wire         [15:0] phase,      // 2^-16 period
-    output logic               done,       // strobe: step is new
-    output logic signed [16:0] step,       // 2^-16 period since the preceding phase
-    output logic        [15:0] phase_out,  // 2^-16 period: the phase after step; held until done
-    output logic               overspeed   // strobe, with done: a quarter period or more off
+module fringe_tracker #(
+    parameter  int AXES = 1,                            // axes that are served
+    // bits of the number of an axis
+    localparam int A    = AXES == 1 ? 1 : $clog2(AXES)
+) (
+    input wire clk,
+    input wire rst,  // level: the phase is forgotten; the next one has step 0
+    input wire valid,  // strobe: phase is new
+    input wire [A-1:0] axis,  // number of its axis; 0 for one axis
+    input wire [15:0] phase,  // 2^-16 period
+    output logic done,  // strobe: step is new
+    output logic signed [16:0] step,  // 2^-16 period since the preceding phase
+    output logic [15:0] phase_out,  // 2^-16 period: the phase after step; held until done
+    output logic overspeed  // strobe, with done: a quarter period or more off
 );
     localparam signed [15:0] QUARTER = 16'sd16384;
 
-    logic started, outlier;  // outlier: the last phase was an overspeed
+    logic [AXES-1:0] started;
+    wire             outlier;  // the last phase was an overspeed
     // predicted_phase = last + predicted_step
-    logic [15:0] last, predicted_phase;
-    logic signed [16:0] speed;  // step per sample, without outliers
+    wire [15:0] last, predicted_phase;
+    wire signed  [16:0] speed;  // step per sample, without outliers
     // speed, or after an outlier the step that leads back to the line
-    logic signed [17:0] predicted_step;
+    wire signed  [17:0] predicted_step;
 
+    wire                known = started[axis];
     wire signed  [15:0] deviation = $signed(phase - predicted_phase);
     wire signed  [18:0] measured_step = 19'(predicted_step) + 19'(deviation);
     wire                near = deviation > -QUARTER && deviation < QUARTER;
     wire                fits = measured_step[18:16] == {3{measured_step[16]}};
     wire signed  [15:0] nearest = $signed(phase - last);
+    wire                follows = known && fits && near;
+    wire                strays = known && fits && !near && !outlier;
 
-    assign phase_out = last;
+    // state after this phase
+    logic signed [16:0] new_speed;
+    logic signed [17:0] new_predicted_step;
+    logic        [15:0] new_predicted_phase;
+    always_comb begin
+        new_speed           = '0;
+        new_predicted_step  = '0;
+        new_predicted_phase = phase;
+        if (follows) begin
+            new_speed           = outlier ? speed : measured_step[16:0];
+            new_predicted_step  = 18'(new_speed);
+            new_predicted_phase = outlier ? phase + speed[15:0] : {phase[14:0], 1'b0} - last;
+        end else if (strays) begin
+            new_speed           = speed;
+            new_predicted_step  = 18'(speed) - 18'(deviation);
+            new_predicted_phase = predicted_phase + speed[15:0];
+        end
+    end
+
+    axis_memory #(
+        .AXES (AXES),
+        .WIDTH(68)
+    ) u_state (
+        .clk,
+        .write     (valid),
+        .write_axis(axis),
+        .value     ({strays, new_speed, new_predicted_step, new_predicted_phase, phase}),
+        .axis,
+        .stored    ({outlier, speed, predicted_step, predicted_phase, last})
+    );
 
     always_ff @(posedge clk) begin
         done      <= valid;
-        overspeed <= 1'b0;
+        overspeed <= valid && known && !follows;
         if (valid) begin
-            started <= 1'b1;
-            outlier <= 1'b0;
-            last    <= phase;
-            predicted_phase     <= phase;
-            if (!started) step <= '0;
-            else if (fits && near) begin
-                step <= measured_step[16:0];
-                if (!outlier) speed <= measured_step[16:0];
-                predicted_step <= outlier ? 18'(speed) : 18'(measured_step);
-                predicted_phase      <= outlier ? phase + speed[15:0] : {phase[14:0], 1'b0} - last;
-            end else begin
-                overspeed <= 1'b1;
-                if (fits && !outlier) begin
-                    step     <= measured_step[16:0];
-                    outlier  <= 1'b1;
-                    predicted_step <= 18'(speed) - 18'(deviation);
-                    predicted_phase      <= predicted_phase + speed[15:0];
-                end else begin
-                    step     <= 17'(nearest);
-                    speed    <= '0;
-                    predicted_step <= '0;
-                end
-            end
+            started[axis] <= 1'b1;
+            phase_out     <= phase;
+            if (!known) step <= '0;
+            else if (follows || strays) step <= measured_step[16:0];
+            else step <= 17'(nearest);
         end
         if (rst) begin
-            started   <= 1'b0;
-            outlier   <= 1'b0;
-            speed     <= '0;
-            predicted_step  <= '0;
+            started   <= '0;
             step      <= '0;
             done      <= 1'b0;
             overspeed <= 1'b0;
@@ -91,11 +109,14 @@ module fringe_tracker (
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        if (past && started) assert (predicted_phase == 16'(last + predicted_step[15:0]));
-        if (past && !started) assert (predicted_step == 0);
+        assume (axis == '0);
+        if (past && started) begin
+            assert (predicted_phase == 16'(last + predicted_step[15:0]));
+            assert (phase_out == last);
+        end
         if (past && !$past(rst)) begin
             assert (done == $past(valid));
-            if (done) assert (last == $past(phase));
+            if (done) assert (phase_out == $past(phase));
             if (done && $past(started)) assert (step[15:0] == last - $past(last));
             if (done && $past(started) && !overspeed) begin
                 assert (19'(step) - 19'($past(predicted_step)) < 19'(QUARTER));
@@ -148,7 +169,8 @@ module fringe_tracker (
                 assert (sum == 0 && scale == 0);
             end
             if (samples < 2) begin
-                assert (!outlier && speed == 0 && predicted_step == 0 && good == 3);
+                assert (good == 3);
+                if (started) assert (!outlier && speed == 0 && predicted_step == 0);
             end else if (good == 0 && outlier) begin
                 assert (speed == increment && 24'(predicted_step) == 24'(increment) - away);
                 assert (away >= -32768 && away < 32768);

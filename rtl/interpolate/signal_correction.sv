@@ -5,23 +5,29 @@
 // latency  3 cycles from valid to done
 // rate     one sample per cycle
 // behaviour Both outputs have half the size of the inputs, so a corrected channel may be larger
-//          than full scale; what is still too large saturates.
+//          than full scale; what is still too large saturates. With AXES above 1 it serves several
+//          axes, each with settings of its own. Settings act on the samples after load.
 // source   Heydemann, Appl. Opt. 20 (1981) 3382: cos' = cos - cos_offset, sin' = gain (sin -
 //          sin_offset) + quadrature_error cos'
 // model    tb/interpolate/signal_correction.py, equal in every bit of every cycle
 `default_nettype none
 
 module signal_correction #(
-    parameter int W = 8  // bits of a sample, 8 to 16
+    parameter  int W    = 8,                            // bits of a sample, 8 to 16
+    parameter  int AXES = 1,                            // axes that are served
+    // bits of the number of an axis
+    localparam int A    = AXES == 1 ? 1 : $clog2(AXES)
 ) (
     input  wire                 clk,
     input  wire                 rst,               // level: nothing is corrected until load
-    input  wire                 load,              // strobe: use the settings from this cycle on
+    input  wire                 load,              // strobe: use the settings from now on
+    input  wire         [A-1:0] load_axis,         // number of the axis for which; 0 for one axis
     input  wire signed  [ 15:0] sin_offset,        // full scale = 2^15
     input  wire signed  [ 15:0] cos_offset,        // full scale = 2^15
     input  wire         [ 16:0] gain,              // factor, 1.0 = 2^16
     input  wire signed  [ 16:0] quadrature_error,  // factor, 1.0 = 2^16
     input  wire                 valid,             // strobe: sin and cos are a new sample
+    input  wire         [A-1:0] axis,              // number of its axis; 0 for one axis
     input  wire signed  [W-1:0] sin,               // counts, full scale = 2^(W-1)
     input  wire signed  [W-1:0] cos,               // counts, full scale = 2^(W-1)
     output logic                done,              // strobe: sin_out and cos_out are new
@@ -33,20 +39,36 @@ module signal_correction #(
     end
 
     logic centred, multiplied;  // strobes
-    logic signed [15:0] sin_centre, cos_centre;
-    logic signed [17:0] sin_factor, cos_factor;
+    logic [AXES-1:0] loaded;  // the axis has settings since reset
+    wire signed [15:0] sin_centre, cos_centre;
+    wire        [16:0] sin_gain;
+    wire signed [16:0] cos_part_of_sin;
+    logic signed [17:0] sin_factor, cos_factor;  // of the sample that is centred
     logic signed [16:0] sin_channel, cos_channel, cos_kept;  // full scale of sin = 2^15
     logic signed [34:0] sin_part, cos_part;
 
     wire signed [15:0] sin_wide = 16'(sin) <<< (16 - W);
     wire signed [15:0] cos_wide = 16'(cos) <<< (16 - W);
-    wire signed [15:0] sin_zero = load ? sin_offset : sin_centre;
-    wire signed [15:0] cos_zero = load ? cos_offset : cos_centre;
+    wire               known = loaded[axis];
+    wire signed [15:0] sin_zero = known ? sin_centre : 16'sd0;
+    wire signed [15:0] cos_zero = known ? cos_centre : 16'sd0;
     wire signed [35:0] sum = 36'(sin_part) + 36'(cos_part) + 36'sd65536;
     wire signed [18:0] sin_half = 19'(sum >>> 17);  // rounded
     wire signed [16:0] cos_half = 17'((18'(cos_kept) + 18'sd1) >>> 1);
     wire               sin_fits = sin_half[18:15] == {4{sin_half[18]}};
     wire               cos_fits = cos_half[16] == cos_half[15];
+
+    axis_memory #(
+        .AXES (AXES),
+        .WIDTH(66)
+    ) u_settings (
+        .clk,
+        .write     (load),
+        .write_axis(load_axis),
+        .value     ({sin_offset, cos_offset, gain, quadrature_error}),
+        .axis,
+        .stored    ({sin_centre, cos_centre, sin_gain, cos_part_of_sin})
+    );
 
     always_ff @(posedge clk) begin
         centred    <= valid;
@@ -55,6 +77,8 @@ module signal_correction #(
         if (valid) begin
             sin_channel <= 17'(sin_wide) - 17'(sin_zero);
             cos_channel <= 17'(cos_wide) - 17'(cos_zero);
+            sin_factor  <= known ? $signed({1'b0, sin_gain}) : 18'sd65536;
+            cos_factor  <= known ? 18'(cos_part_of_sin) : 18'sd0;
         end
         if (centred) begin
             sin_part <= sin_channel * sin_factor;
@@ -65,22 +89,14 @@ module signal_correction #(
             sin_out <= sin_fits ? sin_half[15:0] : {sin_half[18], {15{!sin_half[18]}}};
             cos_out <= cos_fits ? cos_half[15:0] : {cos_half[16], {15{!cos_half[16]}}};
         end
-        if (load) begin
-            sin_centre <= sin_offset;
-            cos_centre <= cos_offset;
-            sin_factor <= $signed({1'b0, gain});
-            cos_factor <= 18'(quadrature_error);
-        end
+        if (load) loaded[load_axis] <= 1'b1;
         if (rst) begin
             centred    <= 1'b0;
             multiplied <= 1'b0;
             done       <= 1'b0;
             sin_out    <= '0;
             cos_out    <= '0;
-            sin_centre <= '0;
-            cos_centre <= '0;
-            sin_factor <= 18'sd65536;
-            cos_factor <= '0;
+            loaded     <= '0;
         end
     end
 endmodule

@@ -3,81 +3,111 @@
 // that a lost fringe is detected.
 //
 // latency  3 cycles from valid to disagreement
-// rate     one position per cycle
-// behaviour The constant difference between position and count is learned from the first position
-//          after reset, from every position while limit is 0, and from the next position after a
-//          shift by 0 periods. A shift by any other number of periods is added to the constant
-//          exactly: moving the origin hides no disagreement.
+// rate     one step per cycle
+// method   The steps of the position are added up, and the count is subtracted. What is left is 0
+//          when both move alike, wherever the origin is: a shift of the origin changes nothing.
+// behaviour  The position at which both agree is learned from the first step after reset or after
+//          `learn`, and from every step while limit is 0. With AXES above 1 it serves several axes;
+//          step, count and limit must be those of the axis of the step.
 // limits   `limit` must cover the quarter period between two counts, the offset of the two
 //          comparators, and twice the distance travelled while the deglitchers delay an edge: the
 //          count lags that distance in each direction.
 // source   S0: the fringe count and the arctangent come from the same two photodetectors
 // model    tb/position/count_phase_check.py, equal in every bit of every cycle
-// proved   there is no disagreement while limit is 0, and no shift ever causes one
+// proved   there is no disagreement while limit is 0, and none while the steps move the position by
+//          as much as the count
+// proof    depth 8
 `default_nettype none
 
-module count_phase_check (
-    input  wire               clk,
-    input  wire               rst,            // level: clears disagreement, learns the constant
-    input  wire        [19:0] limit,          // 2^-16 period; 0: not checked
-    input  wire               valid,          // strobe: position belongs to a new sample
-    /* verilator lint_off UNUSEDSIGNAL */  // the count has no more than 46 bits to compare with
-    input  wire signed [47:0] position,       // Q32.16 periods
-    /* verilator lint_on UNUSEDSIGNAL */
-    input  wire signed [31:0] count,          // 1/4 period, wraps
-    input  wire               shift,          // strobe: shift_periods is added in the next cycle
-    input  wire signed [31:0] shift_periods,  // periods; 0: learn the constant again
-    output logic              disagreement    // level: the two differ by more than limit
+module count_phase_check #(
+    parameter  int AXES = 1,                            // axes that are served
+    // bits of the number of an axis
+    localparam int A    = AXES == 1 ? 1 : $clog2(AXES)
+) (
+    input  wire                   clk,
+    input  wire                   rst,          // level: clears disagreement, learns again
+    input  wire        [AXES-1:0] learn,        // levels: learn at the next step of axis n
+    input  wire                   valid,        // strobe: the position moves by step
+    input  wire        [   A-1:0] axis,         // number of its axis; 0 for one axis
+    input  wire signed [    16:0] step,         // 2^-16 period
+    input  wire signed [    31:0] count,        // 1/4 period, wraps
+    input  wire        [    19:0] limit,        // 2^-16 period; 0: not checked
+    output logic       [AXES-1:0] disagreement  // levels: the two differ by more than limit
 );
     localparam int D = 46;  // bits of the difference; the count wraps at 2^32 / 4 periods
 
-    logic known, measured, compared;
-    logic signed [D-1:0] between, constant, difference;
+    logic [AXES-1:0] known;
+    logic measured, compared, learned, learned_q;
+    logic [A-1:0] axis_q, axis_qq;
+    logic [31:0] count_q;
+    logic [19:0] limit_q, limit_qq;
+    logic        [D-1:0] moved_q;
+    logic signed [D-1:0] difference;
 
-    wire signed [D-1:0] moved = shift ? {shift_periods[D-17:0], 16'b0} : '0;
-    wire                learn = !known || limit == '0;
-    wire        [D-1:0] size = difference < 0 ? -difference : difference;
+    // the sum of the steps, from the count at which it was learned
+    wire         [D-1:0] travelled;
+    wire         [D-1:0] moved = travelled + D'(step);
+    wire                 learns = !known[axis] || limit == '0;
+    // beyond 2^20 it is too large for any limit
+    wire                 far = difference[D-1:20] != {(D - 20) {difference[D-1]}};
+    wire         [ 20:0] size = difference[D-1] ? -difference[20:0] : difference[20:0];
+
+    axis_memory #(
+        .AXES (AXES),
+        .WIDTH(D)
+    ) u_travelled (
+        .clk,
+        .write     (valid),
+        .write_axis(axis),
+        .value     (learns ? {count, 14'b0} : moved),
+        .axis,
+        .stored    (travelled)
+    );
 
     always_ff @(posedge clk) begin
         measured   <= valid;
-        between    <= position[D-1:0] - {count, 14'b0} + moved;
-        constant   <= (measured && learn ? between : constant) + moved;
-        compared   <= measured && !learn;
-        difference <= between - constant;
-        if (compared) disagreement <= size > D'(limit);
-        if (measured) known <= 1'b1;
-        if (shift && shift_periods == 0) known <= 1'b0;
-        if (limit == '0 || (measured && learn)) disagreement <= 1'b0;
+        axis_q     <= axis;
+        learned    <= learns;
+        moved_q    <= moved;
+        count_q    <= count;
+        limit_q    <= limit;
+        compared   <= measured;
+        axis_qq    <= axis_q;
+        learned_q  <= learned;
+        limit_qq   <= limit_q;
+        difference <= moved_q - {count_q, 14'b0};
+        if (compared) disagreement[axis_qq] <= !learned_q && (far || size > 21'(limit_qq));
+        known <= (known | (AXES'(valid) << axis)) & ~learn;
         if (rst) begin
-            known        <= 1'b0;
+            known        <= '0;
             measured     <= 1'b0;
             compared     <= 1'b0;
-            disagreement <= 1'b0;
+            disagreement <= '0;
         end
     end
 
 `ifdef FORMAL
-    (* anyconst *)logic              still;  // only the origin moves
-    wire signed [47:0] by = shift ? $signed({shift_periods, 16'b0}) : 48'sd0;
-    wire signed [47:0] next_position = position + by;
-    logic              past = 1'b0;
+    (* anyconst *)logic        alike;  // the steps are those of the count
+    logic        past = 1'b0;
+    logic [31:0] last;  // count at the last step
+    wire  [45:0] travelled_count = {count - last, 14'b0};
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        if (past && still) begin
-            assume (count == $past(count));
-            assume (position == $past(next_position));
-        end
+        assume (axis == '0);
+        if (valid) last <= count;
+        if (alike && valid) assume (D'(step) == travelled_count);
         if (past) begin
-            if ($past(limit) == 0) assert (!disagreement);
-            if (still) begin
+            if (compared && limit_qq == 0) assert (learned_q);
+            if ($past(compared) && $past(limit_qq) == 0) assert (!disagreement);
+            if (alike) begin
+                if (known) assert (travelled == {last, 14'b0});
+                if (measured && !learned) assert (moved_q == {count_q, 14'b0});
+                if (compared && !learned_q) assert (difference == 0);
                 assert (!disagreement);
-                if (measured) assert (between == position[D-1:0] - {count, 14'b0});
-                if (known) assert (constant == position[D-1:0] - {count, 14'b0});
-                if (compared) assert (difference == 0);
             end
             cover (disagreement);
-            cover (compared && still && position < 0 && limit == 1);
+            cover (alike && compared && !learned_q && step != 0 && valid);
         end
     end
 `endif

@@ -11,8 +11,7 @@
 
 module axis_registers #(
     parameter int HAS_DRIVE   = 1,  // 0: settings that need it read 0
-    parameter int HAS_MONITOR = 1,  // 0: settings that need it read 0
-    parameter int HAS_SINE    = 1   // 0: settings that need it read 0
+    parameter int HAS_MONITOR = 1   // 0: settings that need it read 0
 ) (
     input  wire                clk,
     input  wire                rst,                             // settings take their first values
@@ -40,9 +39,9 @@ module axis_registers #(
     input  wire         [ 4:0] state_queue_free,                // segments that can be queued
     input  wire                state_armed,                     // a profile waits for start_at
     input  wire                state_fine_saturated,            // fine stage at its limit
-    input  wire         [10:0] faults,                          // latched faults
-    input  wire         [10:0] causes_now,                      // causes present now
-    input  wire         [10:0] first_fault,                     // cause that came first
+    input  wire         [11:0] faults,                          // latched faults
+    input  wire         [11:0] causes_now,                      // causes present now
+    input  wire         [11:0] first_fault,                     // cause that came first
     input  wire signed  [47:0] fault_position,                  // 1/65536 period
     input  wire signed  [47:0] position,                        // position [1/65536 period]
     input  wire signed  [47:0] target,                          // 1/65536 period
@@ -52,11 +51,10 @@ module axis_registers #(
     input  wire                zero_crossing_up,                // strobe: crossed going up
     input  wire                zero_crossing_down,              // strobe: crossed going down
     output logic        [ 5:0] sensing_deglitch,                // samples in a row that a, sample
-    output logic        [ 7:0] sensing_outlier_step,            // outlier filter
-    output logic        [ 7:0] sensing_outlier_hold,            // most samples held in a row
+    output logic               sensing_written,                 // strobe: new value
     output logic        [15:0] amplitude_window_low,            // amplitude window
     output logic        [15:0] amplitude_window_high,           // amplitude window
-    output logic        [19:0] disagreement_limit,              // 1/65536 period
+    output logic               disagreement_limit_written,      // strobe: new value
     input  wire signed  [15:0] sample_sin,                      // last sample
     input  wire signed  [15:0] sample_cos,                      // last sample
     input  wire         [15:0] phase_phase,                     // 1/65536 period
@@ -122,8 +120,8 @@ module axis_registers #(
     // words read in the cycle before
     assign rdata = ({32{get_state}} & {18'd0, state_fine_saturated, state_armed, state_queue_free,
         state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
-        state_limit_low, state_enabled}) | ({32{get_faults}} & {21'd0, faults}) |
-        ({32{get_causes_now}} & {21'd0, causes_now}) | ({32{get_first_fault}} & {21'd0,
+        state_limit_low, state_enabled}) | ({32{get_faults}} & {20'd0, faults}) |
+        ({32{get_causes_now}} & {20'd0, causes_now}) | ({32{get_first_fault}} & {20'd0,
         first_fault}) | ({32{get_fault_position}} & fault_position[31:0]) |
         ({32{get_fault_position_high}} & {16'd0, fault_position_high}) | ({32{get_position}} &
         position[31:0]) | ({32{get_position_high}} & {16'd0, position_high}) | ({32{get_target}} &
@@ -182,12 +180,11 @@ module axis_registers #(
             6'h10 && wdata[0]));
         zero_crossing_down_held <= zero_crossing_down || (zero_crossing_down_held && !(put && word
             == 6'h10 && wdata[1]));
+        sensing_written <= put && word == 6'h11;
         if (put && word == 6'h11) sensing_deglitch <= wdata[5:0];
-        if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_step <= wdata[23:16];
-        if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_hold <= wdata[31:24];
         if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_low <= wdata[15:0];
         if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_high <= wdata[31:16];
-        if (HAS_SINE != 0 && put && word == 6'h13) disagreement_limit <= wdata[19:0];
+        disagreement_limit_written <= put && word == 6'h13;
         encoder_events_held[0] <= encoder_events[0] || (encoder_events_held[0] && !(put && word ==
             6'h17 && wdata[0]));
         encoder_events_held[1] <= encoder_events[1] || (encoder_events_held[1] && !(put && word ==
@@ -244,12 +241,11 @@ module axis_registers #(
             shift_origin <= 32'h00000000;
             zero_crossing_up_held <= '0;
             zero_crossing_down_held <= '0;
+            sensing_written <= 1'b0;
             sensing_deglitch <= 6'h10;
-            sensing_outlier_step <= 8'h00;
-            sensing_outlier_hold <= HAS_SINE == 0 ? '0 : 8'h03;
             amplitude_window_low <= 16'h0000;
             amplitude_window_high <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
-            disagreement_limit <= 20'h00000;
+            disagreement_limit_written <= 1'b0;
             encoder_events_held[0] <= '0;
             encoder_events_held[1] <= '0;
             encoder_events_held[2] <= '0;

@@ -15,8 +15,7 @@ module feedback_registers #(
     parameter int HAS_ENCODER_CHECK = 1,  // 0: settings that need it read 0
     parameter int HAS_HARMONICS     = 1,  // 0: settings that need it read 0
     parameter int HAS_MONITOR       = 1,  // 0: settings that need it read 0
-    parameter int HAS_RECORDER      = 1,  // 0: settings that need it read 0
-    parameter int HAS_SINE          = 1   // 0: settings that need it read 0
+    parameter int HAS_RECORDER      = 1   // 0: settings that need it read 0
 ) (
     input wire clk,
     input wire rst,  // settings take their first values
@@ -30,7 +29,7 @@ module feedback_registers #(
     output logic [3:0] edge_filter_tolerated,  // tolerated samples
     output logic [1:0] decoder_mode,  // 0 x4
     output logic index_active_low,  // 1: the index is active low
-    output logic [1:0] index_gate_mask,  // {b, a}, 1: it must equal gate
+    output logic [1:0] index_gate_mask,  // {b
     output logic [1:0] index_gate,  // {b, a}, levels at the index
     output logic index_up,  // 1: use an index going up
     output logic index_down,  // 1: use an index going down
@@ -51,13 +50,10 @@ module feedback_registers #(
     input wire index_events_armed,  // index events
     input wire signed [31:0] index_count,  // 1/4 period
     input wire [31:0] edge_time,  // cycle
-    output logic signed [15:0] correction_offset_sin,  // offsets, full scale 2^15: sin
-    output logic signed [15:0] correction_offset_cos,  // offsets, full scale 2^15: cos
-    output logic [16:0] correction_gain,  // gain of the sine
-    output logic signed [16:0] correction_quadrature_error,  // quadrature error
+    output logic correction_offset_written,  // strobe: new value
+    output logic correction_gain_written,  // strobe: new value
+    output logic correction_quadrature_error_written,  // strobe: new value
     output logic harmonic_enable,  // 1
-    output logic signed [17:0] harmonic_point,  // 2^-20 period
-    output logic [7:0] harmonic_point_point,  // 1/256 period
     output logic harmonic_point_written,  // strobe: new value
     output logic [15:0] recorder_decimation,  // one sample out of so many
     output logic recorder_phases,  // 1: phases, 0: samples
@@ -66,7 +62,7 @@ module feedback_registers #(
     input wire [31:0] recorder_word,  // word of the burst
     output logic recorder_word_read,  // strobe: read in this cycle
     input wire [14:0] signal_faults,  // signal faults present now
-    input wire [14:0] first_signal_faults,  // signal faults that came first
+    input wire [14:0] first_signal_faults,  // first signal faults
     output logic [14:0] signal_fault_mask,  // faults that stop the drive
     output logic [15:0] lissajous_limits_clip_level,  // ADC counts
     output logic [15:0] lissajous_limits_tolerance,  // ADC counts
@@ -79,7 +75,7 @@ module feedback_registers #(
     output logic [15:0] quadrature_limits_quadrature_error,  // ADC counts
     output logic [15:0] quadrature_limits_sign_threshold,  // ADC counts
     output logic [6:0] capture_sources,  // sources that capture
-    input wire capture_state_present,  // a capture waits in captured_*
+    input wire capture_state_present,  // capture waits in captured_*
     input wire [4:0] capture_state_free,  // captures that still fit
     input wire capture_state_overrun,  // strobe: an event was dropped
     input wire [6:0] captured_sources,  // oldest capture: sources
@@ -205,14 +201,11 @@ module feedback_registers #(
             == 6'h05 && wdata[0]));
         index_events_revolution_wrong_held <= index_events_revolution_wrong ||
             (index_events_revolution_wrong_held && !(put && word == 6'h05 && wdata[1]));
-        if (HAS_SINE != 0 && put && word == 6'h08) correction_offset_sin <= wdata[15:0];
-        if (HAS_SINE != 0 && put && word == 6'h08) correction_offset_cos <= wdata[31:16];
-        if (HAS_SINE != 0 && put && word == 6'h09) correction_gain <= wdata[16:0];
-        if (HAS_SINE != 0 && put && word == 6'h0A) correction_quadrature_error <= wdata[16:0];
+        correction_offset_written <= put && word == 6'h08;
+        correction_gain_written <= put && word == 6'h09;
+        correction_quadrature_error_written <= put && word == 6'h0A;
         if (HAS_HARMONICS != 0 && put && word == 6'h0B) harmonic_enable <= wdata[0];
         harmonic_point_written <= put && word == 6'h0C;
-        if (HAS_HARMONICS != 0 && put && word == 6'h0C) harmonic_point <= wdata[17:0];
-        if (HAS_HARMONICS != 0 && put && word == 6'h0C) harmonic_point_point <= wdata[25:18];
         if (HAS_RECORDER != 0 && put && word == 6'h0D) recorder_decimation <= wdata[15:0];
         if (HAS_RECORDER != 0 && put && word == 6'h0D) recorder_phases <= wdata[16];
         if (HAS_MONITOR != 0 && put && word == 6'h12) signal_fault_mask <= wdata[14:0];
@@ -294,14 +287,11 @@ module feedback_registers #(
             strobes_compare_disarm <= 1'b0;
             index_events_found_held <= '0;
             index_events_revolution_wrong_held <= '0;
-            correction_offset_sin <= 16'h0000;
-            correction_offset_cos <= 16'h0000;
-            correction_gain <= HAS_SINE == 0 ? '0 : 17'h10000;
-            correction_quadrature_error <= 17'h00000;
+            correction_offset_written <= 1'b0;
+            correction_gain_written <= 1'b0;
+            correction_quadrature_error_written <= 1'b0;
             harmonic_enable <= HAS_HARMONICS == 0 ? '0 : 1'b1;
             harmonic_point_written <= 1'b0;
-            harmonic_point <= 18'h00000;
-            harmonic_point_point <= 8'h00;
             recorder_decimation <= HAS_RECORDER == 0 ? '0 : 16'h0001;
             recorder_phases <= 1'b0;
             signal_fault_mask <= 15'h0000;

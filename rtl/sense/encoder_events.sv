@@ -16,7 +16,7 @@ module encoder_events (
     input  wire  [ 1:0] decoder_mode,       // 3: pulses and direction
     input  wire         own_steps,          // level: the axis counts its own steps
     input  wire         illegal_edge,       // strobe: a and b changed together
-    input  wire         overspeed,          // strobe: the phase jumped
+    input  wire         overspeed,          // strobe: the phase jumped, or a sample was lost
     input  wire         disagreement,       // strobe: position and count differ
     input  wire  [14:0] signal_faults,      // levels, bit 0 amplitude low, 1 amplitude high
     input  wire  [ 2:0] edge_rejected,      // strobes {z, b, a}: the filter rejected a pulse

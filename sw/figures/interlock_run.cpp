@@ -47,16 +47,17 @@ enum Cause {  // the bits of axis.faults
     UNDERRUN = AXIS_FAULTS_PROFILE_UNDERRUN_SHIFT,
     OVERRUN = AXIS_FAULTS_STEP_OVERRUN_SHIFT,
     SERVO = AXIS_FAULTS_SERVO_OVERRUN_SHIFT,
+    SAMPLE = AXIS_FAULTS_SAMPLE_OVERRUN_SHIFT,
     CAUSES
 };
 static_assert(LIMIT_LOW == 0 && LIMIT_HIGH == 1 && ESTOP == 2 && FOLLOWING == 3 && ENCODER == 4 &&
                   WATCHDOG == 5 && DRIVE == 6 && CPU == 7 && UNDERRUN == 8 && OVERRUN == 9 &&
-                  SERVO == 10,
+                  SERVO == 10 && SAMPLE == 11,
               "NAMES has the order of axis.faults");
-const char* const NAMES[CAUSES] = {"limit_low",       "limit_high",   "estop",
-                                   "following_error", "encoder",      "bus_watchdog",
-                                   "drive",           "cpu",          "profile_underrun",
-                                   "step_overrun",    "servo_overrun"};
+const char* const NAMES[CAUSES] = {"limit_low",       "limit_high",    "estop",
+                                   "following_error", "encoder",       "bus_watchdog",
+                                   "drive",           "cpu",           "profile_underrun",
+                                   "step_overrun",    "servo_overrun", "sample_overrun"};
 constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU};
 constexpr unsigned LATCH_ALWAYS = 1 << ESTOP | 1 << DRIVE | 1 << CPU;
 
@@ -77,6 +78,7 @@ struct Bench {
     // what was seen
     int64_t target = 0, target_before = 0;  // of the last two ticks that were served, 2^-16 period
     int64_t early_at = NEVER;               // a tick too soon
+    int64_t sine_position = NEVER;          // of sine and cosine, which stand still, while in use
     int64_t steps = 0, off_at = NEVER, on_clk = 0;
     bool was_on = false, step_was = false;
 
@@ -297,7 +299,8 @@ struct Campaign {
         const int64_t position = b.get_position(AXIS_FAULT_POSITION_LOW);
         bool there = false;
         for (int64_t t = b.off_at - SENSED; t <= b.off_at - 3; t++)
-            there |= position == b.count_at(t) * COUNT;
+            there |=
+                position == (b.sine_position == NEVER ? b.count_at(t) * COUNT : b.sine_position);
         if (!there) fail("wrong latched position");
     }
 
@@ -488,6 +491,31 @@ struct Campaign {
         nonsense(SERVO);
     }
 
+    // The other converter of the chain sends a sample in every cycle, until one of the axis is
+    // lost.
+    void sample() {
+        Bench& b = *bench;
+        b.put(AXIS_ENCODER_FAULT_MASK, AXIS_ENCODER_EVENTS_OVERSPEED_MASK);
+        b.access(true, FEEDBACK + FEEDBACK_POSITION_SOURCE, 0);
+        calm();
+        b.sine_position = b.get_position(AXIS_POSITION_LOW);
+        switch_on(0, 0);
+        b.run(random.below(3 * b.period));
+        const int64_t since = b.now;
+        if (!b.pins->drive_enable) return fail("drive off without a cause");
+        b.off_at = NEVER, b.pins->other_sample = 1;
+        for (int came = b.pins->sample_valid; came < 2; came += b.pins->sample_valid) b.step();
+        const Window window{b.now + 2, b.now + 2};
+        b.run(random.below(2 * b.period));
+        b.pins->other_sample = 0;
+        b.run(2 * b.period);
+        judge({{SAMPLE, window}}, since);
+        if (!(b.get(AXIS_ENCODER_EVENTS) & AXIS_ENCODER_EVENTS_OVERSPEED_MASK))
+            fail("the axis that lost the sample reports no event");
+        pins_rest();
+        nonsense(SAMPLE);
+    }
+
     // These are no faults: a glitch of a switch, and a switch while homing.
     void no_fault() {
         Bench& b = *bench;
@@ -521,11 +549,14 @@ struct Campaign {
             underrun();
         else if (cause == OVERRUN)
             overrun();
-        else
+        else if (cause == SERVO)
             servo();
+        else
+            sample();
         faults++, injected[cause]++;
         if (!person_resets()) fail("a person cannot reset it");
         if (random.one_in(10)) harmless++, no_fault(), calm();
+        if (cause == SAMPLE) begin(), calm();  // counts again
         failures += !good;
     }
 

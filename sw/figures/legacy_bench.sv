@@ -44,6 +44,7 @@ module legacy_bench #(
         .step   (largest_move),
         .hold   (8'd255),
         .valid,
+        .axis   (1'b0),
         .sin,
         .cos,
         .done   (held),
@@ -81,6 +82,7 @@ module legacy_bench #(
         .clk,
         .rst,
         .valid    (found),
+        .axis     (1'b0),
         .phase,
         .done     (stepped),
         .step,
@@ -120,16 +122,18 @@ module legacy_bench #(
         .clk,
         .rst,
         .load,
+        .load_axis(1'b0),
         .sin_offset,
         .cos_offset,
         .gain,
         .quadrature_error,
         .valid,
+        .axis     (1'b0),
         .sin,
         .cos,
-        .done   (corrected),
-        .sin_out(sin_corrected),
-        .cos_out(cos_corrected)
+        .done     (corrected),
+        .sin_out  (sin_corrected),
+        .cos_out  (cos_corrected)
     );
     arctan_pipelined #(
         .W    (16),
@@ -147,20 +151,23 @@ module legacy_bench #(
     harmonic_correction u_harmonics (
         .clk,
         .rst,
-        .enable   (1'b1),
+        .enable    (1'b1),
+        .table_axis(1'b0),
         .write,
         .point,
         .value,
         .swap,
-        .valid    (turned),
-        .phase    (plain_phase),
-        .done     (straight),
-        .phase_out(true_phase)
+        .valid     (turned),
+        .axis      (1'b0),
+        .phase     (plain_phase),
+        .done      (straight),
+        .phase_out (true_phase)
     );
     fringe_tracker u_follower (
         .clk,
         .rst,
         .valid    (straight),
+        .axis     (1'b0),
         .phase    (true_phase),
         .done     (moved),
         .step     (move),

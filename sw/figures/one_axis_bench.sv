@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// one_axis_bench -- one axis with its motion engine and its register memory, as in node.sv; the top
-// of sw/figures/interlock_run.cpp.
+// one_axis_bench -- one axis with its motion engine, its register memory and an interpolation chain
+// that it shares with a converter of any speed, as in node.sv; the top of
+// sw/figures/interlock_run.cpp.
 `default_nettype none
 
 module one_axis_bench (
@@ -23,6 +24,8 @@ module one_axis_bench (
     input  wire         estop,             // level: 1 pressed
     input  wire         watchdog_expired,  // level: the master of the bus is silent
     input  wire         cpu_stopped,       // level: the soft core has stopped or hangs
+    input  wire         other_sample,      // strobe: a sample of the other converter
+    output logic        sample_valid,      // strobe: a sample of the axis
     // pins
     input  wire         encoder_a,         // pin
     input  wire         encoder_b,         // pin
@@ -51,6 +54,16 @@ module one_axis_bench (
     wire signed [47:0] shift_by;
     wire line_start, line_idle, rate_valid, rate_restart, rate_steep, line_stopped;
     wire signed [36:0] rate;
+    wire        [ 7:0] chain_setting_written;
+    wire chain_harmonic_enable, chain_learn;
+    wire signed [7:0] sample_sin, sample_cos, chain_sin, chain_cos;
+    // the axis is number 1 of the chain, which serves the other converter first
+    wire [1:0] chain_sampled, chain_rejected, chain_phase_valid, chain_done, chain_overspeed;
+    wire [1:0] chain_disagreement, chain_lost;
+    wire [15:0] chain_plain_phase, chain_phase;
+    wire signed [16:0] chain_step;
+    wire               sample_overrun;
+    wire signed [31:0] quadrature_count;
     wire compare_pulse, adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi;
 
     assign ready  = memory_ready && !waits;
@@ -153,26 +166,56 @@ module one_axis_bench (
         .rate_restart,
         .rate_steep
     );
-    axis u_axis (
+    interpolation_chain #(
+        .AXES(2)
+    ) u_chain (
         .clk,
         .rst,
-        .select         (select && address[15:8] == 8'h04),
-        .feedback_select(select && address[15:8] == 8'h0C),
-        .actuator_select(select && address[15:8] == 8'h14),
+        .setting        (wdata),
+        .setting_written({chain_setting_written, 8'd0}),
+        .harmonic_enable({chain_harmonic_enable, 1'b0}),
+        .learn          ({chain_learn, 1'b0}),
+        .valid          ({sample_valid, other_sample}),
+        .sin            ({sample_sin, 8'd0}),
+        .cos            ({sample_cos, 8'd100}),
+        .count          ({quadrature_count, 32'd0}),
+        .sampled        (chain_sampled),
+        .sampled_sin    (chain_sin),
+        .sampled_cos    (chain_cos),
+        .rejected       (chain_rejected),
+        .phase_valid    (chain_phase_valid),
+        .plain_phase    (chain_plain_phase),
+        .done           (chain_done),
+        .step           (chain_step),
+        .phase          (chain_phase),
+        .overspeed      (chain_overspeed),
+        .disagreement   (chain_disagreement),
+        .overrun        (sample_overrun),
+        .lost           (chain_lost)
+    );
+    axis #(
+        .HAS_OWN_CHAIN(0)
+    ) u_axis (
+        .clk,
+        .rst,
+        .select            (select && address[15:8] == 8'h04),
+        .feedback_select   (select && address[15:8] == 8'h0C),
+        .actuator_select   (select && address[15:8] == 8'h14),
         .write,
-        .word           (address[7:2]),
+        .word              (address[7:2]),
         .wdata,
         .wdata_low,
-        .rdata          (live),
+        .rdata             (live),
         .feedback_rdata,
         .actuator_rdata,
         .tick,
         .sample_tick,
         .limit_tick,
         .now,
-        .start          (1'b0),
-        .servo_overrun  (overrun),
-        .sync           (1'b0),
+        .start             (1'b0),
+        .servo_overrun     (overrun),
+        .sample_overrun,
+        .sync              (1'b0),
         .estop,
         .watchdog_expired,
         .cpu_stopped,
@@ -189,7 +232,7 @@ module one_axis_bench (
         .arm,
         .controlled_stop,
         .hold_target,
-        .waits          (request_waits),
+        .waits             (request_waits),
         .pending,
         .result_valid,
         .result_kind,
@@ -202,12 +245,31 @@ module one_axis_bench (
         .rate_restart,
         .rate_steep,
         .line_stopped,
+        .chain_setting_written,
+        .chain_harmonic_enable,
+        .chain_learn,
+        .sample_valid,
+        .sample_sin,
+        .sample_cos,
+        .quadrature_count,
+        .chain_sampled     (chain_sampled[1]),
+        .chain_sin,
+        .chain_cos,
+        .chain_rejected    (chain_rejected[1]),
+        .chain_phase_valid (chain_phase_valid[1]),
+        .chain_plain_phase,
+        .chain_done        (chain_done[1]),
+        .chain_step,
+        .chain_phase,
+        .chain_overspeed   (chain_overspeed[1]),
+        .chain_disagreement(chain_disagreement[1]),
+        .chain_lost        (chain_lost[1]),
         .encoder_a,
         .encoder_b,
-        .encoder_z      (1'b0),
-        .probe          (2'b00),
-        .adc_sin        (1'b0),
-        .adc_cos        (1'b0),
+        .encoder_z         (1'b0),
+        .probe             (2'b00),
+        .adc_sin           (1'b0),
+        .adc_cos           (1'b0),
         .adc_cs_n,
         .adc_sclk,
         .compare_pulse,
@@ -224,9 +286,13 @@ module one_axis_bench (
         .drive_enable
     );
 
+    wire chain = &{
+        1'b0, chain_sampled[0], chain_rejected[0], chain_phase_valid[0], chain_done[0],
+        chain_overspeed[0], chain_disagreement[0], chain_lost[0]
+    };
     wire unused = &{
-        1'b0, address[1:0], tick_period[23:18], settings, busy, compare_pulse, adc_cs_n, adc_sclk,
-        dac_cs_n, dac_sclk, dac_sdi
+        1'b0, chain, address[1:0], tick_period[23:18], settings, busy, compare_pulse, adc_cs_n,
+        adc_sclk, dac_cs_n, dac_sclk, dac_sdi
     };
 endmodule
 

@@ -34,6 +34,10 @@ module three_axes_bench (
         wire block_up, block_down;
         wire closed_loop, play, arm, controlled_stop, hold_target, pending;
         wire [47:0] position, moved_by;
+        wire [7:0] chain_setting_written;
+        wire chain_harmonic_enable, chain_learn, sample_valid;
+        wire signed [7:0] sample_sin, sample_cos;
+        wire signed [31:0] quadrature_count;
 
         axis #(
             .HAS_BRIDGE    (0),
@@ -46,13 +50,14 @@ module three_axes_bench (
             .rst,
             .tick,
             .sample_tick,
-            .limit_tick      (1'b0),
-            .start           (1'b0),
-            .sync            (1'b0),
-            .estop           (1'b0),
-            .watchdog_expired(1'b0),
-            .cpu_stopped     (1'b0),
-            .servo_overrun   (1'b0),
+            .limit_tick        (1'b0),
+            .start             (1'b0),
+            .sync              (1'b0),
+            .estop             (1'b0),
+            .watchdog_expired  (1'b0),
+            .cpu_stopped       (1'b0),
+            .servo_overrun     (1'b0),
+            .sample_overrun    (1'b0),
             // without a motion engine: only positions are read
             .position,
             .step_made,
@@ -68,38 +73,58 @@ module three_axes_bench (
             .controlled_stop,
             .hold_target,
             .pending,
-            .waits           (1'b0),
-            .result_valid    (1'b0),
-            .result_kind     (3'd0),
-            .result          (48'd0),
-            .result_flag     (1'b0),
-            .line_start      (1'b0),
-            .line_idle       (1'b0),
-            .rate_valid      (1'b0),
-            .rate            (37'd0),
-            .rate_restart    (1'b0),
-            .rate_steep      (1'b0),
+            .waits             (1'b0),
+            .result_valid      (1'b0),
+            .result_kind       (3'd0),
+            .result            (48'd0),
+            .result_flag       (1'b0),
+            .line_start        (1'b0),
+            .line_idle         (1'b0),
+            .rate_valid        (1'b0),
+            .rate              (37'd0),
+            .rate_restart      (1'b0),
+            .rate_steep        (1'b0),
             .line_stopped,
-            .select          (select[n]),
+            // without a shared chain
+            .chain_setting_written,
+            .chain_harmonic_enable,
+            .chain_learn,
+            .sample_valid,
+            .sample_sin,
+            .sample_cos,
+            .quadrature_count,
+            .chain_sampled     (1'b0),
+            .chain_sin         (8'd0),
+            .chain_cos         (8'd0),
+            .chain_rejected    (1'b0),
+            .chain_phase_valid (1'b0),
+            .chain_plain_phase (16'd0),
+            .chain_done        (1'b0),
+            .chain_step        (17'sd0),
+            .chain_phase       (16'd0),
+            .chain_overspeed   (1'b0),
+            .chain_disagreement(1'b0),
+            .chain_lost        (1'b0),
+            .select            (select[n]),
             .write,
             .word,
             .wdata,
-            .wdata_low       (32'd0),               // no setting of 64 bits is written
-            .rdata           (answer[n]),
-            .feedback_select (feedback_select[n]),
-            .feedback_rdata  (feedback[n]),
-            .actuator_select (1'b0),
+            .wdata_low         (32'd0),               // no setting of 64 bits is written
+            .rdata             (answer[n]),
+            .feedback_select   (feedback_select[n]),
+            .feedback_rdata    (feedback[n]),
+            .actuator_select   (1'b0),
             .actuator_rdata,
             .now,
-            .encoder_a       (a[n]),
-            .encoder_b       (b[n]),
-            .encoder_z       (1'b0),
-            .probe           (2'b00),
-            .adc_sin         (1'b0),
-            .adc_cos         (1'b0),
-            .limit_low_open  (1'b0),
-            .limit_high_open (1'b0),
-            .drive_fault_n   (1'b1),
+            .encoder_a         (a[n]),
+            .encoder_b         (b[n]),
+            .encoder_z         (1'b0),
+            .probe             (2'b00),
+            .adc_sin           (1'b0),
+            .adc_cos           (1'b0),
+            .limit_low_open    (1'b0),
+            .limit_high_open   (1'b0),
+            .drive_fault_n     (1'b1),
             .adc_cs_n,
             .adc_sclk,
             .bridge_a,
@@ -119,8 +144,12 @@ module three_axes_bench (
             1'b0, position, step_made, step_down, moves, moved, moved_by, block_up, block_down,
             closed_loop, play, arm, controlled_stop, hold_target, pending
         };
+        wire chain = &{
+            1'b0, chain_setting_written, chain_harmonic_enable, chain_learn, sample_valid,
+            sample_sin, sample_cos, quadrature_count
+        };
         wire unused = &{
-            pins, dac, engine, actuator_rdata, drive_enable, compare_pulse, line_stopped
+            pins, dac, engine, chain, actuator_rdata, drive_enable, compare_pulse, line_stopped
         };
     end
 

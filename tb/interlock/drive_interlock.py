@@ -10,13 +10,13 @@ LIMIT_LOW, LIMIT_HIGH, ESTOP = (FAULTS[name] for name in ("limit_low", "limit_hi
 FOLLOWING_ERROR, ENCODER = FAULTS["following_error"], FAULTS["encoder"]
 BUS_WATCHDOG, DRIVE, CPU = (FAULTS[name] for name in ("bus_watchdog", "drive", "cpu"))
 PROFILE_UNDERRUN, STEP_OVERRUN = FAULTS["profile_underrun"], FAULTS["step_overrun"]
-SERVO_OVERRUN = FAULTS["servo_overrun"]
+SERVO_OVERRUN, SAMPLE_OVERRUN = FAULTS["servo_overrun"], FAULTS["sample_overrun"]
 LATCH_ALWAYS = ESTOP | DRIVE | CPU
 
 INPUTS = dict.fromkeys(
     """enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault
     encoder_fault watchdog_expired cpu_trap profile_underrun step_overrun servo_overrun
-    error_valid error_too_far position valid_in command_in""".split(),
+    sample_overrun error_valid error_too_far position valid_in command_in""".split(),
     0,
 )
 
@@ -42,6 +42,7 @@ class DriveInterlock:
             i["profile_underrun"],
             i["step_overrun"],
             i["servo_overrun"],
+            i["sample_overrun"],
         )
         return sum(1 << n for n, cause in enumerate(present) if cause)
 

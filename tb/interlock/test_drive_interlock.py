@@ -20,6 +20,7 @@ from tb.interlock.drive_interlock import (
     LIMIT_HIGH,
     LIMIT_LOW,
     PROFILE_UNDERRUN,
+    SAMPLE_OVERRUN,
     SERVO_OVERRUN,
     STEP_OVERRUN,
     DriveInterlock,
@@ -36,8 +37,9 @@ CAUSES = dict(
     profile_underrun=PROFILE_UNDERRUN,
     step_overrun=STEP_OVERRUN,
     servo_overrun=SERVO_OVERRUN,
+    sample_overrun=SAMPLE_OVERRUN,
 )
-STROBES = ("profile_underrun", "servo_overrun")  # causes that end by themselves
+STROBES = ("profile_underrun", "servo_overrun", "sample_overrun")  # causes that end by themselves
 ALWAYS = ("estop", "drive_fault", "cpu_trap")
 SIGNED = ("command_out", "fault_position")
 HIGH, LOW = (1 << 15) - 1, -1 << 15
@@ -332,6 +334,7 @@ async def any_inputs_match_the_model(dut):
             position=random.randrange(-1 << 47, 1 << 47),
             profile_underrun=rare(150),
             servo_overrun=rare(150),
+            sample_overrun=rare(150),
         )
         for name in (*CAUSES, "enable_request", "closed_loop", "homing"):
             if name not in STROBES and rare(40):

@@ -3,11 +3,8 @@
 
 SETTINGS = dict(
     deglitch=0,
-    outlier_step=0,
-    outlier_hold=0,
     amplitude_low=0,
     amplitude_high=65535,
-    disagreement_limit=0,
     encoder_fault_mask=0,
 )
 INPUTS = dict(
@@ -20,6 +17,8 @@ INPUTS = dict(
     word=0,
     wdata=0,
     wdata_low=0,
+    sensing_written=0,
+    limit_written=0,
     shift=0,
     shift_periods=0,
     a=0,
@@ -30,4 +29,16 @@ INPUTS = dict(
     own_downward=1,
     adc_sin=1,
     adc_cos=1,
+    chain_sampled=0,
+    chain_sin=0,
+    chain_cos=0,
+    chain_rejected=0,
+    chain_phase_valid=0,
+    chain_plain_phase=0,
+    chain_done=0,
+    chain_step=0,
+    chain_phase=0,
+    chain_overspeed=0,
+    chain_disagreement=0,
+    chain_lost=0,
 )

@@ -17,24 +17,26 @@ def corrected(phase, table):
 class HarmonicCorrection:
     """step() returns (done, phase_out) after the cycle."""
 
-    def __init__(self):
-        self.tables = [[0] * POINTS, [0] * POINTS]
+    def __init__(self, axes=1):
+        self.tables = [[[0] * POINTS, [0] * POINTS] for _ in range(axes)]
         self.reset()
 
     def reset(self):
-        self.page, self.swapped, self.flow, self.out = 0, False, [None] * (LATENCY - 1), 0
+        self.page, self.swapped = [0] * len(self.tables), [False] * len(self.tables)
+        self.flow, self.out = [None] * (LATENCY - 1), 0
 
-    def step(self, valid, phase, enable=1, write=None, swap=0, rst=0):
-        """`write` is None or (point, value)."""
-        self.page ^= swap
-        self.swapped |= bool(swap)
-        self.flow.append(
-            (corrected(phase, self.tables[self.page]) if enable and self.swapped else phase)
-            if valid
-            else None
-        )
+    def in_force(self, axis=0):
+        return self.tables[axis][self.page[axis]]
+
+    def step(self, valid, phase, enable=1, write=None, swap=0, rst=0, axis=0, table_axis=0):
+        """`write` is None or (point, value), `enable` one bit for each axis."""
+        self.page[table_axis] ^= swap
+        self.swapped[table_axis] |= bool(swap)
+        acts = enable >> axis & 1 and self.swapped[axis]
+        out = corrected(phase, self.in_force(axis)) if acts else phase
+        self.flow.append(out if valid else None)
         if write:
-            self.tables[self.page ^ 1][write[0]] = write[1]
+            self.tables[table_axis][self.page[table_axis] ^ 1][write[0]] = write[1]
         if rst:
             self.reset()
             return 0, 0

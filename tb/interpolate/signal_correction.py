@@ -33,22 +33,22 @@ def corrected(sin, cos, settings, w=8):
 class SignalCorrection:
     """step() returns (done, sin_out, cos_out) after the cycle."""
 
-    def __init__(self, w=8):
-        self.w = w
+    def __init__(self, w=8, axes=1):
+        self.w, self.axes = w, axes
         self.reset()
 
     def reset(self):
-        self.settings, self.flow, self.out = Settings(), [None] * (LATENCY - 1), (0, 0)
+        self.settings = [Settings()] * self.axes
+        self.flow, self.out = [None] * (LATENCY - 1), (0, 0)
 
-    def step(self, valid, sin, cos, load=None, rst=0):
+    def step(self, valid, sin, cos, load=None, rst=0, axis=0, load_axis=0):
         """`load` is None or the Settings to load."""
         if rst:
             self.reset()
             return 0, 0, 0
-        # An offset acts on the sample of its cycle. The factors multiply one cycle later, so they
-        # act from that sample on, too.
-        self.settings = load or self.settings
-        self.flow.append(corrected(sin, cos, self.settings, self.w) if valid else None)
+        self.flow.append(corrected(sin, cos, self.settings[axis], self.w) if valid else None)
+        if load:
+            self.settings[load_axis] = load
         ready = self.flow.pop(0)
         self.out = ready or self.out
         return int(ready is not None), *self.out

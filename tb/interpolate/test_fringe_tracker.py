@@ -6,12 +6,13 @@ cycle against the model.
 import random
 
 import cocotb
+import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.interpolate.fringe_tracker import QUARTER, FringeTracker
 
-IDLE = dict(valid=0, phase=0)
+IDLE = dict(valid=0, axis=0, phase=0)
 
 
 async def begin(dut):
@@ -26,9 +27,9 @@ async def again(dut):
     dut.rst.value = 0
 
 
-async def clock(dut, valid, phase):
+async def clock(dut, valid, phase, axis=0):
     """Advance one cycle; returns done, step, overspeed."""
-    dut.valid.value, dut.phase.value = valid, phase % 65536
+    dut.valid.value, dut.phase.value, dut.axis.value = valid, phase % 65536, axis
     await FallingEdge(dut.clk)
     assert not int(dut.done.value) or dut.phase_out.value == phase % 65536
     return int(dut.done.value), dut.step.value.to_signed(), int(dut.overspeed.value)
@@ -149,5 +150,27 @@ async def any_input_matches_the_model_in_every_cycle(dut):
         assert got == want, f"cycle {cycle}"
 
 
-def test_fringe_tracker():
-    run("fringe_tracker", __file__)
+@cocotb.test()
+async def axes_do_not_disturb_each_other(dut):
+    axes = int(dut.AXES.value)
+    needs(axes > 1, "one axis")
+    await begin(dut)
+    models = [FringeTracker() for _ in range(axes)]
+    phases, speeds = [0] * axes, [random.randrange(-50_000, 50_000) for _ in range(axes)]
+    for cycle in range(10_000):
+        axis = random.randrange(axes)
+        if random.random() < 0.01:
+            speeds[axis] = -speeds[axis]
+        phases[axis] += speeds[axis] + random.randrange(-1000, 1000)
+        phase = random.getrandbits(16) if random.random() < 0.02 else phases[axis] % 65536
+        rst = int(random.random() < 0.001)
+        dut.rst.value = rst
+        got, want = await clock(dut, 1, phase, axis), models[axis].step(1, phase)
+        if rst:
+            models, want = [FringeTracker() for _ in range(axes)], (0, 0, 0)
+        assert got == want, f"cycle {cycle}"
+
+
+@pytest.mark.parametrize("axes", [1, 5])
+def test_fringe_tracker(axes):
+    run("fringe_tracker", __file__, AXES=axes)

@@ -7,25 +7,29 @@ import math
 import random
 
 import cocotb
+import pytest
 from cocotb.triggers import FallingEdge
 
 from tb.bench import run, start
 from tb.interpolate.harmonic_correction import LATENCY, POINTS, HarmonicCorrection, corrected
 
-IDLE = dict(valid=0, phase=0, enable=1, write=0, point=0, value=0, swap=0)
+IDLE = dict(valid=0, axis=0, phase=0, enable=0, write=0, table_axis=0, point=0, value=0, swap=0)
 
 
 async def begin(dut):
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
-    model = HarmonicCorrection()
-    for _ in range(2):  # both tables are known to design and model
-        await load(dut, model, [0] * POINTS)
+    model = HarmonicCorrection(int(dut.AXES.value))
+    for axis in range(2 * len(model.tables)):  # both tables are known to design and model
+        await load(dut, model, [0] * POINTS, axis // 2)
     await cycle(dut, model, rst=1)
     return model
 
 
-async def cycle(dut, model, valid=0, phase=0, enable=1, write=None, swap=0, rst=0):
+async def cycle(
+    dut, model, valid=0, phase=0, enable=None, write=None, swap=0, rst=0, axis=0, table_axis=0
+):
+    enable = (1 << len(model.tables)) - 1 if enable is None else enable
     dut.valid.value, dut.phase.value, dut.enable.value, dut.swap.value, dut.rst.value = (
         valid,
         phase,
@@ -33,22 +37,23 @@ async def cycle(dut, model, valid=0, phase=0, enable=1, write=None, swap=0, rst=
         swap,
         rst,
     )
+    dut.axis.value, dut.table_axis.value = axis, table_axis
     dut.write.value = int(write is not None)
     if write:
         dut.point.value, dut.value.value = write
     await FallingEdge(dut.clk)
     got, want = (
         (int(dut.done.value), dut.phase_out.value.to_unsigned()),
-        model.step(valid, phase, enable, write, swap, rst),
+        model.step(valid, phase, enable, write, swap, rst, axis, table_axis),
     )
     assert got == want, f"got {got}, the model has {want}"
     return got
 
 
-async def load(dut, model, table):
+async def load(dut, model, table, axis=0):
     for entry in enumerate(table):
-        await cycle(dut, model, write=entry)
-    await cycle(dut, model, swap=1)
+        await cycle(dut, model, write=entry, table_axis=axis)
+    await cycle(dut, model, swap=1, table_axis=axis)
 
 
 async def ask(dut, model, phase, **inputs):
@@ -85,7 +90,7 @@ async def the_line_closes_over_the_period_and_the_phase_wraps(dut):
     model = await begin(dut)
     await load(dut, model, [-131072] + [0] * 254 + [131071])
     for phase in (0, 1, 255, 256, 65535, 65535 - 255, 65535 - 256):
-        assert await ask(dut, model, phase) == corrected(phase, model.tables[model.page])
+        assert await ask(dut, model, phase) == corrected(phase, model.in_force())
     assert await ask(dut, model, 0) == 8192
     assert await ask(dut, model, 255 * 256) == 255 * 256 - 8192
 
@@ -114,7 +119,7 @@ async def reset_in_mid_flow_drops_the_phase_and_the_correction(dut):
 
 @cocotb.test()
 async def any_input_matches_the_model_in_every_cycle(dut):
-    model = await begin(dut)
+    model, axes = await begin(dut), int(dut.AXES.value)
     for _ in range(4000):
         write = (
             (random.randrange(POINTS), random.randrange(-1 << 17, 1 << 17))
@@ -126,11 +131,22 @@ async def any_input_matches_the_model_in_every_cycle(dut):
             model,
             random.getrandbits(1),
             random.choice((0, 65535, random.getrandbits(16))),
-            int(random.random() < 0.9),
+            random.getrandbits(axes) | random.getrandbits(axes),
             write,
             int(random.random() < 0.05),
             int(random.random() < 0.003),
+            random.randrange(axes),
+            random.randrange(axes),
         )
+
+
+@cocotb.test()
+async def each_axis_has_a_table_of_its_own(dut):
+    model = await begin(dut)
+    for axis in range(len(model.tables)):
+        await load(dut, model, [160 * (axis + 1)] * POINTS, axis)
+    for axis in range(len(model.tables)):
+        assert await ask(dut, model, 30_000, axis=axis) == 30_000 - 10 * (axis + 1)
 
 
 def test_the_chords_leave_no_more_of_a_sine_than_the_header_says():
@@ -148,5 +164,6 @@ def test_the_chords_leave_no_more_of_a_sine_than_the_header_says():
         assert worst <= size / 16 * share + 0.55
 
 
-def test_harmonic_correction():
-    run("harmonic_correction", __file__)
+@pytest.mark.parametrize("axes", [1, 3])
+def test_harmonic_correction(axes):
+    run("harmonic_correction", __file__, AXES=axes)

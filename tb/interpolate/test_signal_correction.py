@@ -11,20 +11,32 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.interpolate.signal_correction import LATENCY, Settings, SignalCorrection, corrected
 
-IDLE = dict(valid=0, sin=0, cos=0, load=0, sin_offset=0, cos_offset=0, gain=0, quadrature_error=0)
+IDLE = dict(
+    valid=0,
+    axis=0,
+    sin=0,
+    cos=0,
+    load=0,
+    load_axis=0,
+    sin_offset=0,
+    cos_offset=0,
+    gain=0,
+    quadrature_error=0,
+)
 
 
 async def begin(dut):
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
-    return SignalCorrection(int(dut.W.value))
+    return SignalCorrection(int(dut.W.value), int(dut.AXES.value))
 
 
-async def cycle(dut, model, valid=0, sin=0, cos=0, load=None, rst=0):
+async def cycle(dut, model, valid=0, sin=0, cos=0, load=None, rst=0, axis=0, load_axis=0):
     """Advance design and model by one cycle; returns (done, sin_out, cos_out)."""
+    dut.axis.value, dut.load_axis.value = axis, load_axis
     dut.rst.value, dut.valid.value, dut.sin.value, dut.cos.value, dut.load.value = (
         rst,
         valid,
@@ -37,7 +49,7 @@ async def cycle(dut, model, valid=0, sin=0, cos=0, load=None, rst=0):
             getattr(dut, name).value = value
     await FallingEdge(dut.clk)
     got = int(dut.done.value), dut.sin_out.value.to_signed(), dut.cos_out.value.to_signed()
-    want = model.step(valid, sin, cos, load, rst)
+    want = model.step(valid, sin, cos, load, rst, axis, load_axis)
     assert got == want, f"got {got}, the model has {want}"
     return got
 
@@ -90,8 +102,9 @@ async def a_value_that_is_too_large_saturates(dut):
 async def both_ends_of_every_range_match_the_model(dut):
     model, full = await begin(dut), 1 << int(dut.W.value) - 1
     for settings in product((-32768, 32767), (-32768, 32767), (0, 131071), (-65536, 65535)):
-        for n, (sin, cos) in enumerate(product((-full, full - 1), repeat=2)):
-            await cycle(dut, model, 1, sin, cos, Settings(*settings) if n == 0 else None)
+        await cycle(dut, model, load=Settings(*settings))
+        for sin, cos in product((-full, full - 1), repeat=2):
+            await cycle(dut, model, 1, sin, cos)
     for _ in range(LATENCY):
         await cycle(dut, model)
 
@@ -101,8 +114,8 @@ async def the_settings_change_between_two_samples(dut):
     model = await begin(dut)
     first, second = Settings(100, 200, 65536, 0), Settings(-3000, 5000, 80000, 9000)
     await cycle(dut, model, load=first)
+    await cycle(dut, model, 1, 50, 20, load=second)  # the sample of this cycle has the first ones
     await cycle(dut, model, 1, 50, 20)
-    await cycle(dut, model, 1, 50, 20, load=second)
     w = int(dut.W.value)
     for settings in (first, second):
         assert await cycle(dut, model) == (1, *corrected(50, 20, settings, w))
@@ -139,7 +152,24 @@ async def any_input_matches_the_model_in_every_cycle(dut):
             *anything(w, random),
             load,
             int(random.random() < 0.005),
+            random.randrange(int(dut.AXES.value)),
+            random.randrange(int(dut.AXES.value)),
         )
+
+
+@cocotb.test()
+async def each_axis_has_settings_of_its_own(dut):
+    axes = int(dut.AXES.value)
+    needs(axes > 1, "one axis")
+    model = await begin(dut)
+    for axis in range(axes - 1):
+        await cycle(dut, model, load=Settings(256 * axis, 0, 65536, 0), load_axis=axis)
+    for axis in (*range(axes), 0):
+        await cycle(dut, model, 1, 100, 0, axis=axis)
+    shift = 16 - int(dut.W.value)
+    want = [((100 << shift) - 256 * axis) // 2 for axis in range(axes - 1)] + [50 << shift]
+    got = [model.out[0]] + [(await cycle(dut, model))[1] for _ in range(LATENCY - 1)]
+    assert got == [*want[-2:], want[0]]
 
 
 def test_the_ellipse_of_its_own_settings_becomes_a_circle():
@@ -166,6 +196,6 @@ def test_the_ellipse_of_its_own_settings_becomes_a_circle():
         )
 
 
-@pytest.mark.parametrize("w", [8, 12, 16])
-def test_signal_correction(w):
-    run("signal_correction", __file__, W=w)
+@pytest.mark.parametrize("w, axes", [(8, 1), (12, 1), (16, 1), (8, 5)])
+def test_signal_correction(w, axes):
+    run("signal_correction", __file__, W=w, AXES=axes)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model of rtl/position/count_phase_check.sv: step() advances one cycle and returns disagreement
-after it.
+"""Model of rtl/position/count_phase_check.sv: step() advances one cycle and returns the levels of
+disagreement after it.
 """
+
+LATENCY = 3
 
 
 def wrapped(difference):
@@ -10,28 +12,25 @@ def wrapped(difference):
 
 
 class CountPhaseCheck:
-    """Two pipeline stages: `between` of the preceding position, then its `difference` from the
-    constant.
-    """
+    def __init__(self, axes=1):
+        self.travelled = [None] * axes  # None: to be learned
+        self.disagreement, self.flow = 0, [None] * (LATENCY - 1)
 
-    def __init__(self):
-        self.constant, self.between, self.difference, self.disagreement = None, None, None, 0
+    def judge(self, axis, step, count, limit):
+        """Take one step; returns whether position and count disagree."""
+        if self.travelled[axis] is None or not limit:
+            self.travelled[axis] = count << 14
+            return 0
+        self.travelled[axis] += step
+        return int(abs(wrapped(self.travelled[axis] - (count << 14))) > limit)
 
-    def step(self, limit, valid, position, count, shift, shift_periods):
-        moved = shift_periods << 16 if shift else 0
-        difference, self.difference = self.difference, None
-        if difference is not None:
-            self.disagreement = int(abs(difference) > limit)
-        if self.between is not None:
-            if self.constant is None or not limit:
-                self.constant, self.disagreement = self.between, 0
-            else:
-                self.difference = wrapped(self.between - self.constant)
-        if self.constant is not None:
-            self.constant += moved
-        self.between = wrapped(position - (count << 14)) + moved if valid else None
-        if shift and not shift_periods:
-            self.constant = None
-        if not limit:
-            self.disagreement = 0
+    def step(self, learn, valid, axis, step, count, limit):
+        """`learn` has one bit for each axis."""
+        self.flow.append((axis, self.judge(axis, step, count, limit)) if valid else None)
+        for n in range(len(self.travelled)):
+            if learn >> n & 1:
+                self.travelled[n] = None
+        ready = self.flow.pop(0)
+        if ready:
+            self.disagreement = self.disagreement & ~(1 << ready[0]) | ready[1] << ready[0]
         return self.disagreement

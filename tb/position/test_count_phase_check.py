@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of count_phase_check: an undisturbed scale agrees, a lost fringe is detected, shifts hide
-nothing, and every cycle against the model.
+"""Tests of count_phase_check: an undisturbed scale agrees, a lost fringe is detected, nothing
+depends on where the origin is, and every cycle against the model.
 """
 
 import random
 
 import cocotb
-from cocotb.triggers import FallingEdge, RisingEdge
+import pytest
+from cocotb.triggers import FallingEdge
 
 from tb.bench import run, start
-from tb.position.count_phase_check import CountPhaseCheck
+from tb.position.count_phase_check import LATENCY, CountPhaseCheck
 
-IDLE = dict(limit=0, valid=0, position=0, count=0, shift=0, shift_periods=0)
+IDLE = dict(learn=0, valid=0, axis=0, step=0, count=0, limit=0)
 LIMIT = 32768  # as in tables/bus.toml: halfway between the quarter period between two counts and
 # the 3/4 period that a lost fringe leaves at least
 
@@ -28,46 +29,47 @@ async def again(dut):
     dut.rst.value = 0
 
 
-async def clock(dut, position, count, valid=1, limit=LIMIT, shift=0, shift_periods=0):
-    dut.position.value, dut.count.value, dut.valid.value, dut.limit.value = (
-        position,
-        count,
-        valid,
-        limit,
-    )
-    dut.shift.value, dut.shift_periods.value = shift, shift_periods
+async def clock(dut, step, count, valid=1, limit=LIMIT, learn=0, axis=0):
+    """Advance one cycle; returns the levels of all axes."""
+    dut.step.value, dut.count.value, dut.valid.value, dut.limit.value = step, count, valid, limit
+    dut.learn.value, dut.axis.value = learn, axis
     await FallingEdge(dut.clk)
     return int(dut.disagreement.value)
 
 
-async def settle(dut, position, count, limit=LIMIT):
-    """Wait long enough for two positions to pass."""
-    return [await clock(dut, position, count, limit=limit) for _ in range(6)][-1]
+async def settle(dut, step, count, limit=LIMIT, axis=0):
+    """Take a step, and wait until it is judged."""
+    await clock(dut, step, count, limit=limit, axis=axis)
+    for _ in range(LATENCY - 1):
+        level = await clock(dut, 0, count, valid=0, limit=limit, axis=axis)
+    return level >> axis & 1
 
 
 @cocotb.test()
 async def latency_is_3(dut):
     await begin(dut)
     await settle(dut, 0, 0)
-    dut.position.value, cycle = LIMIT + 1, 0
-    while not int(dut.disagreement.value):
-        await RisingEdge(dut.clk)
-        cycle += 1
-        await FallingEdge(dut.clk)
-        assert cycle <= 3
-    assert cycle == 3
+    levels = [await clock(dut, LIMIT + 1, 0)]
+    levels += [await clock(dut, 0, 0, valid=0) for _ in range(3)]
+    assert levels == [0, 0, 1, 1]
 
 
 @cocotb.test()
 async def the_limit_itself_still_agrees(dut):
     await begin(dut)
-    for limit in (1, LIMIT, (1 << 20) - 1):
+    for limit in (1, LIMIT, 65535):
         for direction in (1, -1):
             await again(dut)
             await settle(dut, 1000, 7, limit)
-            assert not await settle(dut, 1000 + direction * limit, 7, limit)
-            assert await settle(dut, 1000 + direction * (limit + 1), 7, limit)
-            assert not await settle(dut, 1000 + direction * (limit + 16384), 7 + direction, limit)
+            assert not await settle(dut, direction * limit, 7, limit)
+            assert await settle(dut, direction, 7, limit)
+            assert not await settle(dut, direction * 16383, 7 + direction, limit)
+    await again(dut)
+    largest = (1 << 20) - 1
+    await settle(dut, 0, 0, largest)
+    for step in [65535] * 16 + [15]:
+        assert not await settle(dut, step, 0, largest)
+    assert await settle(dut, 1, 0, largest)
 
 
 @cocotb.test()
@@ -79,94 +81,70 @@ async def a_scale_in_motion_with_a_late_count_agrees(dut):
         speed = max(-4096, min(4096, speed + random.randrange(-300, 301)))
         position += speed
         past = past[1:] + [position]
-        assert not await clock(
-            dut, position, past[0] >> 14
-        )  # 1/4 + 3 * 4096 / 65536 period is below the limit
+        # 1/4 + 3 * 4096 / 65536 period is below the limit
+        assert not await clock(dut, speed, past[0] >> 14)
 
 
 @cocotb.test()
 async def one_lost_fringe_shows_in_both_directions(dut):
     await begin(dut)
-    for lost in (65536, -65536):
+    for lost in (65535, -65535):
         await again(dut)
-        await settle(dut, 5000, 0)
-        assert await settle(dut, 5000 + lost, 0)
-        assert await settle(dut, 5000 + lost + 16384, 1)
-        assert not await settle(dut, 5000 + 16384, 1)
+        await settle(dut, 0, 0)
+        assert await settle(dut, lost, 0)
+        assert await settle(dut, 16384, 1)
+        assert not await settle(dut, -lost, 1)
 
 
 @cocotb.test()
-async def a_lost_fringe_shows_at_the_next_position_wherever_the_constant_was_learned(dut):
-    await begin(dut)
-    for reference in (0, 1, 8000, 16383):  # position within a count
-        for place in (0, 16383):
-            for lost in (65536, -65536):
-                await again(dut)
-                await settle(dut, reference, 0)
-                assert not await settle(dut, place, 0)
-                await clock(dut, place + lost, 0)
-                assert [await clock(dut, place + lost, 0) for _ in range(2)] == [0, 1]
-
-
-@cocotb.test()
-async def a_shift_hides_no_disagreement_and_makes_none(dut):
-    await begin(dut)
-    for periods in (3, -100_000, (1 << 31) - 1):
-        await again(dut)
-        await settle(dut, 5000, 0)
-        await clock(dut, 5000, 0, shift=1, shift_periods=periods)
-        here = (5000 + (periods << 16) + (1 << 47)) % (1 << 48) - (1 << 47)
-        for _ in range(6):
-            assert not await clock(dut, here, 0)
-        assert await settle(dut, here - 65536, 0)
-        await clock(dut, here - 65536, 0, shift=1, shift_periods=-1)
-        assert await settle(dut, here - 131072, 0)
-
-
-@cocotb.test()
-async def a_shift_by_0_periods_or_limit_0_learns_the_constant_again(dut):
+async def learning_again_or_limit_0_ends_a_disagreement(dut):
     await begin(dut)
     await settle(dut, 0, 0)
-    assert await settle(dut, 65536, 0)
-    await clock(dut, 65536, 0, shift=1, shift_periods=0)
-    assert not await settle(dut, 65536, 0)
-    assert await settle(dut, 131072, 0)
-    assert not await clock(dut, 131072, 0, limit=0)
-    await settle(dut, 131072, 0, limit=0)
-    assert not await settle(dut, 131072, 0)
-    assert await settle(dut, 65536, 0)
+    assert await settle(dut, 65535, 0)
+    assert await clock(dut, 0, 0, valid=0, learn=1)  # until the next step
+    assert not await settle(dut, 0, 0)
+    assert await settle(dut, -40000, 0)
+    assert not await settle(dut, 0, 0, limit=0)
+    assert not await settle(dut, 0, 0)
+    assert await settle(dut, 40000, 0)
 
 
 @cocotb.test()
 async def the_count_wraps_without_a_disagreement(dut):
     await begin(dut)
-    for count in ((1 << 31) - 1, -1 << 31, (1 << 31) - 2):
-        assert not await settle(dut, (count % (1 << 32)) << 14, count)
+    await settle(dut, 0, (1 << 31) - 1)
+    assert not await settle(dut, 16384, -1 << 31)
+    assert not await settle(dut, -32768, (1 << 31) - 2)
+    assert await settle(dut, 65535, (1 << 31) - 2)
 
 
 @cocotb.test()
 async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
-    model, position, count = CountPhaseCheck(), 0, 0
+    axes = int(dut.AXES.value)
+    model, counts = CountPhaseCheck(axes), [0] * axes
     for cycle in range(20_000):
-        rst, valid, shift = (int(random.random() < share) for share in (0.002, 0.5, 0.05))
-        moved = random.choice(
-            (0, 0, 0, 1, -1, random.randrange(-1 << 30, 1 << 30) if random.random() < 0.02 else 1)
-        )
-        position, count = position + (moved << 14) + random.randrange(-3, 4), count + moved
-        limit = random.choice((LIMIT, LIMIT, LIMIT, 20, 1 << 19, 0 if random.random() < 0.1 else 5))
-        periods = random.choice((0, 1, -5, random.randrange(-1 << 31, 1 << 31)))
-        position, count = (
-            (v + (1 << n - 1)) % (1 << n) - (1 << n - 1) for v, n in ((position, 48), (count, 32))
-        )
+        rst, valid, learn = (int(random.random() < share) for share in (0.001, 0.7, 0.01))
+        axis = random.randrange(axes)
+        moved = random.choice((0, 0, 1, -1, 3, -4 if random.random() < 0.1 else 0))
+        counts[axis] += moved * valid
+        count = (counts[axis] + (1 << 31)) % (1 << 32) - (1 << 31)
+        if random.random() < 0.002:
+            counts[axis] = random.choice((0, (1 << 31) - 3, -1 << 31))
+        step = max(-65536, min(65535, (moved << 14) + random.randrange(-3, 4)))
+        if random.random() < 0.003:
+            step = random.choice((-65536, 65535, 30000))
+        limit = random.choice((LIMIT, LIMIT, LIMIT, 20000, (1 << 20) - 1, 5))
+        limit = 0 if random.random() < 0.01 else limit
+        learn <<= random.randrange(axes)
         dut.rst.value = rst
-        got = await clock(dut, position, count, valid, limit, shift, periods)
-        want = model.step(limit, valid, position, count, shift, periods)
+        got = await clock(dut, step, count, valid, limit, learn, axis)
+        want = model.step(learn, valid, axis, step, count, limit)
         if rst:
-            model, want = CountPhaseCheck(), 0
+            model, want = CountPhaseCheck(axes), 0
         assert got == want, f"cycle {cycle}"
-        position += shift * periods << 16
 
 
-def test_count_phase_check():
-    run("count_phase_check", __file__)
+@pytest.mark.parametrize("axes", [1, 5])
+def test_count_phase_check(axes):
+    run("count_phase_check", __file__, AXES=axes)

@@ -19,7 +19,7 @@ PERIOD, QUARTER = 1 << 16, 1 << 14
 # the quarter period between two counts, and as much again for comparators and lag
 LIMIT = PERIOD // 2
 SPACING = 6  # cycles from sample to sample, the fewest that the check can distinguish
-LATENCY = 5  # cycles from phase to disagreement
+LATENCY = 4  # cycles from phase to disagreement
 
 
 class Scale:
@@ -51,9 +51,9 @@ class Scale:
             overspeed |= int(dut.overspeed.value)
         step, expected_overspeed = self.tracker.follow(phase)
         position = self.unwrap.step(1, step, phase, 0)[1]
-        for cycle in range(4):
+        for cycle in range(3):
             disagreement = self.coarse.step(
-                LIMIT, int(cycle == 0), position, int(dut.count.value.to_signed()), 0, 0
+                0, int(cycle == 0), 0, step, dut.count.value.to_signed(), LIMIT
             )
         got = dut.position.value.to_signed(), overspeed, int(dut.disagreement.value)
         assert got == (position, expected_overspeed, disagreement)
@@ -66,7 +66,7 @@ async def begin(dut):
 
 
 @cocotb.test()
-async def latency_is_5_from_phase_to_disagreement(dut):
+async def latency_is_4_from_phase_to_disagreement(dut):
     scale = await begin(dut)
     await scale.begin()
     await scale.sample(100)

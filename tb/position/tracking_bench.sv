@@ -24,6 +24,7 @@ module tracking_bench (
         .clk,
         .rst,
         .valid,
+        .axis     (1'b0),
         .phase,
         .done     (stepped),
         .step,
@@ -43,12 +44,12 @@ module tracking_bench (
     count_phase_check u_count_phase_check (
         .clk,
         .rst,
-        .limit,
-        .valid        (done),
-        .position,
+        .learn(1'b0),
+        .valid(stepped),
+        .axis (1'b0),
+        .step,
         .count,
-        .shift        (1'b0),
-        .shift_periods(32'sd0),
+        .limit,
         .disagreement
     );
 endmodule

@@ -67,7 +67,7 @@ class RegisterBlock:
         outputs = {
             f.port: 0 if f.momentary and not self.pulse[f"{r.name}_written"] else self.value[f.port]
             for r, f in self.block.own_fields
-            if f.kind == "setting"
+            if f.kind == "setting" and not f.passed
         }
         return {"rdata": self.rdata, **outputs, **self.pulse, **read}
 

@@ -219,9 +219,10 @@ async def strobes_last_one_clk(dut):
         assert (await bus.write(r.word, WORD ^ 1 << f.low))[f.port] == 0
     for r in (r for r in bus.block.registers if r.on_write):
         out = await bus.write(r.word + r.wide, 5 << min(f.low for f in r.fields))
+        held = 0 if r.fields[0].passed else 5 << 32 * r.wide
         assert (
             out[f"{r.name}_written"] == 1
-            and out[r.fields[0].port] == (5 << 32 * r.wide) * bus.there[r.fields[0]]
+            and out.get(r.fields[0].port, 0) == held * bus.there[r.fields[0]]
         )
         after = await bus.clk()
         assert after[f"{r.name}_written"] == 0

@@ -9,20 +9,20 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.sense.outlier_filter import OutlierFilter
 
 
 async def begin(dut):
-    await start(dut, valid=0, sin=0, cos=0, step=0, hold=0)
+    await start(dut, valid=0, axis=0, sin=0, cos=0, step=0, hold=0)
     return OutlierFilter()
 
 
-async def stream(dut, model, samples, step, hold, gaps=False):
+async def stream(dut, model, samples, step, hold, gaps=False, axis=0):
     """Send the samples and compare each with the model one cycle later; return (sin_out, cos_out,
     rejected) of each.
     """
-    dut.step.value, dut.hold.value, out = step, hold, []
+    dut.step.value, dut.hold.value, dut.axis.value, out = step, hold, axis, []
     for sin, cos in samples:
         while gaps and random.getrandbits(1):
             dut.valid.value, dut.sin.value, dut.cos.value = (
@@ -131,6 +131,19 @@ async def any_samples_match_the_model(dut):
         await stream(dut, model, samples, step, hold, gaps=True)
 
 
-@pytest.mark.parametrize("w", [8, 16])
-def test_outlier_filter(w):
-    run("outlier_filter", __file__, W=w)
+@cocotb.test()
+async def axes_with_settings_of_their_own_do_not_disturb_each_other(dut):
+    axes = int(dut.AXES.value)
+    needs(axes > 1, "one axis")
+    await begin(dut)
+    models = [OutlierFilter() for _ in range(axes)]
+    settings = [(random.choice([0, 20, 100]), random.choice([1, 3, 255])) for _ in range(axes)]
+    for _ in range(3000):
+        axis = random.randrange(axes)
+        sample = (random.randrange(-30, 30), random.randrange(-128, 128))
+        await stream(dut, models[axis], [sample], *settings[axis], axis=axis)
+
+
+@pytest.mark.parametrize("w, axes", [(8, 1), (16, 1), (8, 5)])
+def test_outlier_filter(w, axes):
+    run("outlier_filter", __file__, W=w, AXES=axes)

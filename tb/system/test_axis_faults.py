@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults of every cause, injected into an axis with its motion engine in random cycles: the drive
 goes off in time, and cause and position are reported. A servo overrun is a tick that comes before
-the engine has served the last one.
+the engine has served the last one; a sample overrun is a sample that waits in the shared
+interpolation chain when the next one of its axis comes.
 """
 
 from figures import interlock

@@ -17,7 +17,7 @@ from cocotb.triggers import FallingEdge
 from moire.client.built import FEATURES, parameter_of
 from moire.made.registers import FIELDS
 from tables import registers as tables
-from tb.bench import ROOT, package, run, search_path, start
+from tb.bench import ROOT, package, run, search_path, source_of, start
 
 ALL = 255
 BLOCKS = ("axis", "feedback", "actuator")
@@ -46,10 +46,12 @@ NEEDED_BY = {  # what goes with a feature
 }
 FULL = {parameter_of(name): 1 for name in FEATURES} | {"FILTERS": 2, "SEGMENTS": 255}
 OF_ENGINE = ("waits", "result_valid", "result_kind", "result", "result_flag", "servo_overrun")
+OF_CHAIN = ("sample_overrun",)
 OF_LINES = ("line_start", "line_idle", "rate_valid", "rate", "rate_restart", "rate_steep")
 INPUTS = (
     *OF_ENGINE,
     *OF_LINES,
+    *OF_CHAIN,
     *("select", "feedback_select", "actuator_select", "write", "word", "wdata", "tick"),
     *(
         "sample_tick",
@@ -81,6 +83,8 @@ WRONG = {  # parameters of a node that cannot be built, and the rule
     "AN_ACTUATOR_NEEDS_A_DRIVE": dict(HAS_BRIDGE=0, HAS_STEPPER=0, HAS_DAC=0),
     "FINE_STAGE_NEEDS_THE_DAC": dict(HAS_DAC=0, HAS_FINE_STAGE=1),
     "SEGMENTS_MUST_BE_0_OR_FROM_3_TO_255": dict(SEGMENTS=2),
+    # no converter of 8 axes is as fast: this one gives a sample in each 7 cycles
+    "SAMPLES_COME_TOO_FAST_FOR_THE_AXES": dict(AXES=8, CLK_HZ=15_000_000, ADC_FRAME=3),
     "A_SERVO_TICK_HAS_TOO_FEW_CYCLES_FOR_THE_AXES": dict(CLK_HZ=2_000_000),
 }
 
@@ -108,7 +112,7 @@ def verilator(top, parameters):
             *("--timescale", "1ns/1ps", "+libext+.sv+.v", "--top-module", top),
             *(word for room in search_path() for word in ("-y", room)),
             *(f"-G{name}={value}" for name, value in parameters.items()),
-            *(ROOT / "rtl" / "cpu" / "picorv32.vlt", ROOT / "rtl" / f"{top}.sv"),
+            *(ROOT / "rtl" / "cpu" / "picorv32.vlt", source_of(top)),
         ],
         env={**os.environ, "VERILATOR_ROOT": str(folder)},
         capture_output=True,
@@ -158,6 +162,13 @@ def test_nothing_is_left_of_a_feature_that_is_not_built(feature):
 def test_an_axis_without_a_feature_has_no_warning_beside_one_with_it(feature):
     of_axes = masks(feature, without=ALL ^ 2) | {"AXES": 2, "CLK_HZ": 5_000_000}
     assert verilator("node", of_axes) == ""
+
+
+@pytest.mark.parametrize("cycles", [7, 8])
+def test_a_chain_of_eight_axes_takes_samples_that_are_eight_cycles_apart(cycles):
+    said = verilator("interpolation_chain", dict(AXES=8, SAMPLE_CYCLES=cycles))
+    assert ("SAMPLES_COME_TOO_FAST_FOR_THE_AXES" in said) == (cycles < 8)
+    assert said == "" or cycles < 8
 
 
 @pytest.mark.parametrize("rule", WRONG)

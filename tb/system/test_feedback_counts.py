@@ -393,7 +393,7 @@ async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_i
     await bench.write(
         "strobes", load_correction=1, swap_harmonics=1, record=1, clear_signal_faults=1
     )
-    dut.amplitude_low.value, dut.outlier_step.value, dut.disagreement_limit.value = 65535, 1, 1
+    dut.amplitude_low.value, dut.sensing_written.value, dut.limit_written.value = 65535, 1, 1
     count = 0
     for _ in range(2000):
         step = source.choice((-1, 0, 1))

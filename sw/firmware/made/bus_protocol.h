@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x22265732u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x391503CDu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -106,11 +106,14 @@ enum bus_fault {    // bits
     BUS_FAULT_STEP_OVERRUN = 1 << 9,
     // a servo tick came before the motion engine had served the last one
     BUS_FAULT_SERVO_OVERRUN = 1 << 10,
+    // a sample came before the shared interpolation chain had served the last one
+    BUS_FAULT_SAMPLE_OVERRUN = 1 << 11,
 };
 
 enum bus_encoder_event {    // bits
     BUS_ENCODER_EVENT_ILLEGAL_EDGE = 1 << 0,    // both quadrature levels changed at once
-    BUS_ENCODER_EVENT_OVERSPEED = 1 << 1,    // the phase jumped: too fast, or the signal is damaged
+    // the phase jumped: too fast, the signal is damaged, or a sample was lost
+    BUS_ENCODER_EVENT_OVERSPEED = 1 << 1,
     BUS_ENCODER_EVENT_AMPLITUDE_LOW = 1 << 2,    // signal too small
     BUS_ENCODER_EVENT_AMPLITUDE_HIGH = 1 << 3,    // signal too large
     BUS_ENCODER_EVENT_DISAGREEMENT = 1 << 4,    // interpolated position and quadrature count differ
@@ -344,7 +347,8 @@ enum bus_job_flag {    // bits
     X(7, "the soft core stopped or hangs") \
     X(8, "the profile ran out of segments") \
     X(9, "too many steps are pending") \
-    X(10, "a servo tick came before the motion engine had served the last one")
+    X(10, "a servo tick came before the motion engine had served the last one") \
+    X(11, "a sample came before the shared interpolation chain had served the last one")
 
 // X(code, words), up to a colon
 #define BUS_JOB_STATE_WORDS(X) \

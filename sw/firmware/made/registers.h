@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xe1fff810u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x49d04e40u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -655,16 +655,19 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_FAULTS_SERVO_OVERRUN_MASK 0x00000400u
 #define AXIS_FAULTS_SERVO_OVERRUN_SHIFT 10
 #define AXIS_FAULTS_SERVO_OVERRUN_WIDTH 1
+#define AXIS_FAULTS_SAMPLE_OVERRUN_MASK 0x00000800u
+#define AXIS_FAULTS_SAMPLE_OVERRUN_SHIFT 11
+#define AXIS_FAULTS_SAMPLE_OVERRUN_WIDTH 1
 // r: causes present now, same bits as faults
 #define AXIS_CAUSES_NOW 0x010u
-#define AXIS_CAUSES_NOW_MASK 0x000007ffu
+#define AXIS_CAUSES_NOW_MASK 0x00000fffu
 #define AXIS_CAUSES_NOW_SHIFT 0
-#define AXIS_CAUSES_NOW_WIDTH 11
+#define AXIS_CAUSES_NOW_WIDTH 12
 // r: cause that came first, same bits as faults; one bit
 #define AXIS_FIRST_FAULT 0x014u
-#define AXIS_FIRST_FAULT_MASK 0x000007ffu
+#define AXIS_FIRST_FAULT_MASK 0x00000fffu
 #define AXIS_FIRST_FAULT_SHIFT 0
-#define AXIS_FIRST_FAULT_WIDTH 11
+#define AXIS_FIRST_FAULT_WIDTH 12
 // r: position when the first fault was latched [1/65536 period]
 #define AXIS_FAULT_POSITION 0x018u
 #define AXIS_FAULT_POSITION_LOW 0x018u
@@ -763,7 +766,8 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK 0x00000001u
 #define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_SHIFT 0
 #define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_WIDTH 1
-// phase jump: the phase is more than a quarter period away from the predicted one
+// phase jump: the phase is more than a quarter period away from the predicted one, or a sample was
+// lost
 #define AXIS_ENCODER_EVENTS_OVERSPEED_MASK 0x00000002u
 #define AXIS_ENCODER_EVENTS_OVERSPEED_SHIFT 1
 #define AXIS_ENCODER_EVENTS_OVERSPEED_WIDTH 1
@@ -1155,7 +1159,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_SIGNAL_FAULTS_MASK 0x00007fffu
 #define FEEDBACK_SIGNAL_FAULTS_SHIFT 0
 #define FEEDBACK_SIGNAL_FAULTS_WIDTH 15
-// r: signal faults that came first
+// r: first signal faults
 #define FEEDBACK_FIRST_SIGNAL_FAULTS 0x044u
 #define FEEDBACK_FIRST_SIGNAL_FAULTS_MASK 0x00007fffu
 #define FEEDBACK_FIRST_SIGNAL_FAULTS_SHIFT 0
@@ -1214,7 +1218,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_CAPTURE_SOURCES_WIDTH 7
 // rw: state of the captures; without HAS_CAPTURE there is one, of the index
 #define FEEDBACK_CAPTURE_STATE 0x064u
-// a capture waits in captured_*
+// capture waits in captured_*
 #define FEEDBACK_CAPTURE_STATE_PRESENT_MASK 0x00000001u
 #define FEEDBACK_CAPTURE_STATE_PRESENT_SHIFT 0
 #define FEEDBACK_CAPTURE_STATE_PRESENT_WIDTH 1

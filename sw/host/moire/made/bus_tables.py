@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x22265732
+PROTOCOL_CRC = 0x391503CD
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -120,12 +120,14 @@ FAULTS = {
     8: ("profile_underrun", "the profile ran out of segments"),
     9: ("step_overrun", "too many steps are pending: too fast for the step timing, or blocked"),
     10: ("servo_overrun", "a servo tick came before the motion engine had served the last one"),
+    11: ("sample_overrun",
+         "a sample came before the shared interpolation chain had served the last one"),
 }
 
 # bit: (name, words)
 ENCODER_EVENTS = {
     0: ("illegal_edge", "both quadrature levels changed at once"),
-    1: ("overspeed", "the phase jumped: too fast, or the signal is damaged"),
+    1: ("overspeed", "the phase jumped: too fast, the signal is damaged, or a sample was lost"),
     2: ("amplitude_low", "signal too small"),
     3: ("amplitude_high", "signal too large"),
     4: ("disagreement", "interpolated position and quadrature count differ"),

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xE1FFF810  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x49D04E40  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -779,14 +779,20 @@ FIELDS = (
         "latched faults: servo overrun",
     ),
     Field(
+        "axis", "faults", "sample_overrun",
+        0x0C, 11, 1, False, "r", "",
+        Fraction(1, 1),
+        "latched faults: sample overrun",
+    ),
+    Field(
         "axis", "causes_now", "value",
-        0x10, 0, 11, False, "r", "",
+        0x10, 0, 12, False, "r", "",
         Fraction(1, 1),
         "causes present now, same bits as faults",
     ),
     Field(
         "axis", "first_fault", "value",
-        0x14, 0, 11, False, "r", "",
+        0x14, 0, 12, False, "r", "",
         Fraction(1, 1),
         "cause that came first, same bits as faults; one bit",
     ),
@@ -917,7 +923,8 @@ FIELDS = (
         "axis", "encoder_events", "overspeed",
         0x5C, 1, 1, False, "rw", "",
         Fraction(1, 1),
-        "phase jump: the phase is more than a quarter period away from the predicted one",
+        "phase jump: the phase is more than a quarter period away from the predicted one, or "
+        "a sample was lost",
     ),
     Field(
         "axis", "encoder_events", "amplitude_low",
@@ -1433,7 +1440,7 @@ FIELDS = (
         "feedback", "first_signal_faults", "value",
         0x44, 0, 15, False, "r", "",
         Fraction(1, 1),
-        "signal faults that came first",
+        "first signal faults",
     ),
     Field(
         "feedback", "signal_fault_mask", "value",
@@ -1512,7 +1519,7 @@ FIELDS = (
         "feedback", "capture_state", "present",
         0x64, 0, 1, False, "r", "",
         Fraction(1, 1),
-        "a capture waits in captured_*",
+        "capture waits in captured_*",
     ),
     Field(
         "feedback", "capture_state", "free",
