@@ -234,7 +234,10 @@ class Design:
         header = (folder / f"{ROOT}.h").read_text()
         edge = triggered(code, "eval_nba")
         types = {m[2]: m[1] for line in header.splitlines() if (m := DECLARATION.fullmatch(line))}
-        own = {m[2]: m[1] for line in edge if (m := DECLARATION.fullmatch(line))}
+        own: dict[str, str] = {}
+        for match in filter(None, map(DECLARATION.fullmatch, edge)):
+            if own.setdefault(match[2], match[1]) != match[1]:
+                raise FormError(f"{match[2]} has two types")
         lines = [line for line in edge if not DECLARATION.fullmatch(line)]
         used = "\n".join(line for line in lines if not ZERO.fullmatch(line))
         words = {

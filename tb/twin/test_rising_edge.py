@@ -129,6 +129,27 @@ def test_code_without_the_function_is_refused(tmp_path):
         rising_edge.Design.read(tmp_path)
 
 
+FUNCTION = """void {root}___{name}({root}* vlSelf) {{
+{lines}
+}}
+
+"""
+
+
+def test_a_variable_of_two_types_is_refused(tmp_path):
+    lines = [
+        "CData/*0:0*/ x;",
+        "IData/*31:0*/ x;",
+        "if ((1ULL & vlSelfRef.__VnbaTriggered[0U])) {",
+        "}",
+    ]
+    text = FUNCTION.format(root=rising_edge.ROOT, name="eval_nba", lines="\n".join(lines))
+    (tmp_path / f"{rising_edge.ROOT}__0.cpp").write_text(text)
+    (tmp_path / f"{rising_edge.ROOT}.h").write_text("")
+    with pytest.raises(rising_edge.FormError, match="x has two types"):
+        rising_edge.Design.read(tmp_path)
+
+
 def signals(folder: Path) -> str:
     """The lists of signals of rising_edge_run.cpp."""
     read = rising_edge.Design.read(folder)
