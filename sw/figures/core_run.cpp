@@ -34,6 +34,7 @@ int main(int count, char** words) {
     }
     auto top = std::make_unique<Vtop>();
     uint64_t now = 0;
+    top->ready = 1;
     for (top->rst = 1; now < most && !(now > RESET && top->trap); now++) {
         top->rst = now < RESET;
         top->clk = 0;

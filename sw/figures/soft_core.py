@@ -127,7 +127,7 @@ def simulated(core: Core, words: Path, folder: Path) -> Path:
     include = [f"-I{path}" for path in (folder, HERE.parent, headers, headers / "vltstd")]
     sources = [HERE / "core_run.cpp", *sorted(folder.glob("Vtop*.cpp"))]
     support, made = build.runtime(tool, verilator), folder / "run"
-    flags = [*build.COMPILE, *build.VERILATED, "-DMOIRE_REGISTER_ACCESS", *include]
+    flags = [*build.compile_flags(), *build.VERILATED, "-DMOIRE_REGISTER_ACCESS", *include]
     build.run([tool, *flags, *sources, support, "-o", made], "g++ of core_run.cpp")
     return made
 
@@ -141,11 +141,16 @@ def cycles_of(run: Path) -> dict[str, int]:
     return dict(zip(SECTIONS, spent, strict=True))
 
 
-def work_of(core: Core) -> str:
+def work_of(core: Core) -> tuple[int, dict[str, int]]:
+    """Bytes of the program, {section of core_work.c: cycles}."""
     with tempfile.TemporaryDirectory(dir=ROOT / "build") as made:
         folder = Path(made)
         words, size = program(core, folder)
-        cycles = cycles_of(simulated(core, words, folder))
+        return size, cycles_of(simulated(core, words, folder))
+
+
+def work_line(core: Core) -> str:
+    size, cycles = work_of(core)
     return f"{size} bytes of program; cycles: " + ", ".join(f"{n} {c}" for n, c in cycles.items())
 
 
@@ -221,7 +226,7 @@ def main() -> None:
         if chosen.area and core.source == SOFT_CORE and core.instructions.endswith("-c"):
             continue  # the same hardware
         try:
-            print(f"{name}: {(area_of if chosen.area else work_of)(core)}", flush=True)
+            print(f"{name}: {(area_of if chosen.area else work_line)(core)}", flush=True)
         except build.BuildError as why:
             print(f"{name}: {why}", flush=True)
 

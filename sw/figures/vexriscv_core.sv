@@ -9,6 +9,7 @@ module vexriscv_core #(
 ) (
     input  wire         clk,
     input  wire         rst,
+    input  wire         ready,    // level: the registers take an access
     output logic        select,   // strobe: one access to the registers
     output logic        write,    // level: with select, wdata is to be written
     output logic [15:0] address,  // byte address of a register
@@ -32,7 +33,7 @@ module vexriscv_core #(
 
     wire         in_registers = access_word[29:14] == 16'h8000;
 
-    assign select  = access && access_strobe && in_registers && !answered;
+    assign select  = access && access_strobe && in_registers && ready && !answered;
     assign write   = store;
     assign address = {access_word[13:0], 2'b00};
     assign wdata   = access_wdata;
