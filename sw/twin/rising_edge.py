@@ -3,7 +3,7 @@
 
 Verilator evaluates first the flip-flops, then all logic between them, and keeps every signal in
 memory until the next edge. Here the logic comes first, with the inputs of this cycle, and then the
-flip-flops. Most signals are so needed within one call only: they become local variables, and what
+flip-flops. Most signals are then needed within one call only: they become local variables, and what
 only one branch of a condition needs is computed in this branch. The registers, memories and outputs
 after each edge are the same, bit for bit; tb/twin/test_rising_edge.py compares them.
 
@@ -219,8 +219,6 @@ class Design:
     """Verilator's code of a node, taken apart."""
 
     types: dict[str, str]  # of the signals that are kept between edges, but of arrays
-    arrays: set[str]  # that are kept between edges
-    inputs: dict[str, int]  # {name: bits}
     outputs: set[str]
     locals: dict[str, str]  # types of the variables of the functions
     logic: Names  # signals that depend on others of the same cycle only
@@ -247,8 +245,6 @@ class Design:
         }
         return cls(
             types,
-            set(re.findall(r"^VlUnpacked<.*> (\w+);$", header, re.M)),
-            {m[1]: int(m[2]) + 1 for m in re.finditer(r"VL_IN\w*\(&?(\w+),(\d+),0", header)},
             set(re.findall(r"VL_OUT\w*\(&?(\w+),", header)),
             own,
             changed(triggered(code, "eval_stl"), words),
@@ -344,23 +340,19 @@ class Sinker:
             self.place(n)
         return tuple(s for s in self.block if s)
 
-    def note(self, n: int) -> None:
+    def note(self, n: int, statement: Statement) -> None:
         """Enter what a statement uses and changes."""
-        statement = self.block[n]
-        if statement:
-            for name in statement.effect.needs:
-                self.users[name].add(n)
-            for name in statement.effect.changes:
-                self.writers[name].add(n)
+        for name in statement.effect.needs:
+            self.users[name].add(n)
+        for name in statement.effect.changes:
+            self.writers[name].add(n)
 
-    def forget(self, n: int) -> None:
+    def forget(self, n: int, statement: Statement) -> None:
         """Undo note()."""
-        statement = self.block[n]
-        if statement:
-            for name in statement.effect.needs:
-                self.users[name].discard(n)
-            for name in statement.effect.changes:
-                self.writers[name].discard(n)
+        for name in statement.effect.needs:
+            self.users[name].discard(n)
+        for name in statement.effect.changes:
+            self.writers[name].discard(n)
 
     def place(self, n: int) -> None:
         """Move one statement; those behind it are in their places."""
@@ -370,7 +362,7 @@ class Sinker:
         users = {u for name in effect.changes for u in self.users[name]}
         writers = {w for name in effect.changes for w in self.writers[name]}
         if not all(array(name) in self.passing for name in effect.changes):
-            self.note(n)
+            self.note(n, statement)
             return
         first = min(users | writers, default=n)
         if not users or (first not in users and len(effect.changes) == 1):
@@ -386,7 +378,7 @@ class Sinker:
                 self.sink(statement, u)
             self.block[n] = None
         else:
-            self.note(n)
+            self.note(n, statement)
 
     def join(self, n: int, m: int) -> None:
         """Make one group of a value and its exception, which is m, and move that."""
@@ -398,24 +390,25 @@ class Sinker:
             and all(array(name) in self.passing for name in changes)
             and not self.between(value.effect.needs, n, m)
         ):
-            self.forget(m)
+            self.forget(m, exception)
             self.block[m], self.block[n] = Group((value, exception)), None
             self.place(m)
         else:
-            self.note(n)
+            self.note(n, value)
 
     def sink(self, statement: Statement, n: int) -> None:
         """Put a statement into those branches of a choice that need it."""
-        self.forget(n)
         choice, changes = self.block[n], statement.effect.changes
         assert isinstance(choice, Choice)
+        self.forget(n, choice)
         results = frozenset(array(name) for name in changes)
         yes, no = (
             Sinker(results).sunk((statement, *branch)) if effect.needs & changes else branch
             for branch, effect in zip((choice.yes, choice.no), choice.branches)
         )
-        self.block[n] = Choice(choice.condition, choice.asks, yes, no)
-        self.note(n)
+        sunk = Choice(choice.condition, choice.asks, yes, no)
+        self.block[n] = sunk
+        self.note(n, sunk)
 
     def between(self, names: Names, begin: int, end: int) -> bool:
         """Whether a statement between two changes one of these signals."""
@@ -430,16 +423,13 @@ def function(design: Design) -> str:
         raise FormError(f"logic of inputs stays behind: {', '.join(sorted(late))}")
     kept = {array(name) for name in whole.needs} | design.outputs
     passing = {array(name) for name in whole.changes} - kept
-    here = {**design.locals, **{name: design.types[name] for name in passing & set(design.types)}}
+    here = {
+        **design.locals,
+        **{name: design.types[name] for name in sorted(passing & set(design.types))},
+    }
     statements = Sinker(frozenset(here) & passing).sunk(program)
     text = "\n".join(line for statement in statements for line in statement.lines())
     text = re.sub(r"\bvlSelfRef\.(\w+)", lambda m: m[1] if m[1] in here else m[0], text)
     used = set(NAME.findall(text))
     variables = "".join(f"{kind} {name};\n" for name, kind in here.items() if name in used)
     return f"static void rising_edge({ROOT}& vlSelfRef) {{\n{variables}{text}\n}}\n"
-
-
-def registers(design: Design) -> list[str]:
-    """The signals and arrays that an edge leaves to the next one, and the outputs."""
-    needs = {array(name) for name in effect_of(logic_first(design)).needs}
-    return sorted(needs & (set(design.types) | design.arrays) | design.outputs)
