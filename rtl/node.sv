@@ -46,8 +46,12 @@ module node #(
     parameter int HAS_ANGLE_SENSOR = 0,  // 1: build the receiver of the angle sensor
     parameter int HAS_DISPLAY = 0,  // 1: build the numeric display
     parameter int HAS_STATUS_INPUTS = 0,  // 1: build the status inputs
+    parameter int HAS_SERIAL_CORE = 0,  // 1: bit-serial soft core, with its firmware in a flash
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
-    parameter FIRMWARE = ""  // file of its contents at power-up
+    parameter FIRMWARE = "",  // file of its contents at power-up
+    parameter int PROGRAM_BYTES = 32768,  // bytes that a serial core copies, a power of two
+    parameter int FLASH_START = 131072,  // byte address of its firmware in the flash
+    parameter REGISTER_STYLE = "auto"  // ram_style of the memory of the settings
 ) (
     input  wire               clk,
     input  wire               rst,
@@ -56,6 +60,11 @@ module node #(
     input  wire               rs485_rx,             // pin, idles high
     output logic              rs485_tx,             // pin, idles high
     output logic              rs485_driver_enable,  // pin, 1: drive the bus
+    // flash of a serial core
+    output logic              flash_cs_n,           // pin, low during a command
+    output logic              flash_sclk,           // pin, idles low
+    output logic              flash_mosi,           // pin, data to the flash
+    input  wire               flash_miso,           // pin, data of it, synchronous to flash_sclk
     // emergency stop
     input  wire               estop_open,           // pin, 1: pressed or wire cut
     // scales, bit n or bits 2 n + 1 .. 2 n: axis n
@@ -155,20 +164,46 @@ module node #(
     // interlock
     wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
 
-    soft_core #(
-        .MEMORY_BYTES(MEMORY_BYTES),
-        .FIRMWARE    (FIRMWARE)
-    ) u_core (
-        .clk,
-        .rst,
-        .ready  (memory_ready && !engine_waits),
-        .select,
-        .write,
-        .address(bus_address),
-        .wdata,
-        .rdata,
-        .trap
-    );
+    if (HAS_SERIAL_CORE != 0) begin : g_serial_core
+        serial_core #(
+            .MEMORY_BYTES (MEMORY_BYTES),
+            .PROGRAM_BYTES(PROGRAM_BYTES),
+            .FLASH_START  (FLASH_START)
+        ) u_core (
+            .clk,
+            .rst,
+            .ready  (memory_ready && !engine_waits),
+            .select,
+            .write,
+            .address(bus_address),
+            .wdata,
+            .rdata,
+            .trap,
+            // flash
+            .flash_cs_n,
+            .flash_sclk,
+            .flash_mosi,
+            .flash_miso
+        );
+    end else begin : g_core
+        soft_core #(
+            .MEMORY_BYTES(MEMORY_BYTES),
+            .FIRMWARE    (FIRMWARE)
+        ) u_core (
+            .clk,
+            .rst,
+            .ready  (memory_ready && !engine_waits),
+            .select,
+            .write,
+            .address(bus_address),
+            .wdata,
+            .rdata,
+            .trap
+        );
+        assign {flash_cs_n, flash_sclk, flash_mosi} = 3'b100;
+
+        wire unused = &{1'b0, flash_miso};
+    end
     register_memory #(
         .AXES             (AXES),
         .FILTERS          (FILTERS == 0 ? 0 : HAS_FILTERS),
@@ -183,7 +218,8 @@ module node #(
         .HAS_RECORDER     (HAS_RECORDER),
         .HAS_SINE         (HAS_SINE),
         .HAS_STEPPER      (HAS_STEPPER),
-        .HAS_VELOCITY     (HAS_VELOCITY)
+        .HAS_VELOCITY     (HAS_VELOCITY),
+        .STYLE            (REGISTER_STYLE)
     ) u_register_memory (
         .clk,
         .rst,

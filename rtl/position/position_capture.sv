@@ -55,7 +55,8 @@ module position_capture #(
         DEPTH_MUST_BE_A_POWER_OF_TWO_FROM_4_UP u_error ();
     end
 
-    logic [W-1:0] memory[0:DEPTH-1];
+    // a row that is read while it is written is not shown
+    (* no_rw_check *)logic [W-1:0] memory[0:DEPTH-1];
     logic [W-1:0] head;
     // entries so far; the bit above an address distinguishes full from empty
     logic [A:0] written, read;

@@ -34,7 +34,8 @@ module register_memory #(
     parameter int HAS_RECORDER      = 255,  // axes with a recorder
     parameter int HAS_SINE          = 255,  // axes with sine and cosine
     parameter int HAS_STEPPER       = 255,  // axes with a step generator
-    parameter int HAS_VELOCITY      = 255   // axes with a measured velocity
+    parameter int HAS_VELOCITY      = 255,  // axes with a measured velocity
+    parameter     STYLE             = "auto"  // ram_style of the memory: "huge" takes SB_SPRAM256KA
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -52,7 +53,7 @@ module register_memory #(
 );
     localparam int W = $clog2(3 + 3 * AXES) + 6;  // bits of a place in the memory
 
-    logic [ 31:0] memory                                          [0:2**W-1];
+    (* ram_style = STYLE *)logic [31:0] memory[0:2**W-1];
     logic [ 11:0] count;  // words that have their first value
     logic         commit;  // the low word is stored in this cycle
     logic [W-1:0] low_place;
@@ -94,12 +95,13 @@ module register_memory #(
     assign stored_value = ready ? kept : first;
 
     wire         store = !ready || commit || (put && !low);
-    wire [W-1:0] store_place = commit ? low_place : place;
+    // of a write and of a read: one port, since a low word is not stored while another is read
+    wire [W-1:0] used_place = commit ? low_place : place;
     wire [ 31:0] stored = !ready ? first : commit ? wdata_low : kept;
 
     always_ff @(posedge clk) begin
-        if (store) memory[store_place] <= stored;
-        if (select && !write) rdata <= memory[place];
+        if (store) memory[used_place] <= stored;
+        else if (select && !write) rdata <= memory[used_place];
     end
 
     always_ff @(posedge clk) begin

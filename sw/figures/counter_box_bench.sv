@@ -15,7 +15,11 @@ module counter_box_bench #(
     input  wire  [3:0] encoder_a,
     input  wire  [3:0] encoder_b,
     input  wire  [3:0] encoder_z,
-    input  wire  [7:0] probe
+    input  wire  [7:0] probe,
+    output logic       flash_cs_n,
+    output logic       flash_sclk,
+    output logic       flash_mosi,
+    input  wire        flash_miso
 );
     wire [3:0] adc_cs_n, adc_sclk, compare_pulse, bridge_a, bridge_b, step, direction;
     wire [3:0] dac_cs_n, dac_sclk, dac_sdi, drive_enable;
@@ -28,9 +32,12 @@ module counter_box_bench #(
         .FILTERS     (0),
         .HAS_SINE    (0),
         .HAS_COMPARE (0),
+        .HAS_ENCODER_CHECK(0),
         .HAS_VELOCITY(0),
         .HAS_DRIVE   (0),
-        .MEMORY_BYTES(131072)
+        .HAS_SERIAL_CORE(1),
+        .MEMORY_BYTES(65536),
+        .REGISTER_STYLE("huge")
     ) u_node (
         .clk,
         .rst,
@@ -38,6 +45,10 @@ module counter_box_bench #(
         .rs485_rx,
         .rs485_tx,
         .rs485_driver_enable,
+        .flash_cs_n,
+        .flash_sclk,
+        .flash_mosi,
+        .flash_miso,
         .estop_open     (1'b0),
         .encoder_a,
         .encoder_b,
