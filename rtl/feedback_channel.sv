@@ -594,7 +594,9 @@ module feedback_channel #(
         .software
     );
     if (HAS_CAPTURE != 0) begin : g_capture
-        position_capture u_capture (
+        position_capture #(
+            .ZEROS(HAS_SINE == 0 && SEGMENTS == 0 ? 14 : 0)  // counts are quarters of a period
+        ) u_capture (
             .clk,
             .rst,
             // sources

@@ -86,6 +86,11 @@ class Field:
         return Fraction(base) ** int(exponent) if power else Fraction(base)
 
     @property
+    def in_memory(self) -> bool:
+        """A long counter, which shares the memory of event_counters with the others."""
+        return self.kind == "counter" and self.width == 32
+
+    @property
     def shape(self) -> str:
         return ("signed " if self.signed else "") + span(self.width)
 
@@ -150,8 +155,8 @@ class Register:
         return tuple(f for f in self.fields if "r" in f.access and f.kind == "setting")
 
     def answers(self, constant: int) -> list[Answer]:
-        """What the block itself answers to a read of each word."""
-        if not self.live:
+        """What the block itself answers to a read of each word, except for counts in a memory."""
+        if not self.live or self.live[0].in_memory:
             return []
         f = self.live[0]
         if self.vector:
@@ -208,7 +213,31 @@ class Block:
         for fill in sorted({a.fill for a in answers if a.sign}):
             signs = [f"(get_{a.name} && {a.sign})" for a in answers if a.sign and a.fill == fill]
             texts.append(f"{{{{{fill}{{{' || '.join(signs)}}}}}, {32 - fill}'d0}}")
+        if self.counted:
+            texts.append("({32{get_count}} & count)")
         return " | ".join(texts)
+
+    @property
+    def counted(self) -> list[tuple[int, Field]]:
+        """The counters in the memory of event_counters, each with its word."""
+        return [(r.word, f) for r, f in self.own_fields if f.in_memory]
+
+    @property
+    def counters(self) -> int:
+        """The places of that memory: a power of two."""
+        return 1 << max(word for word, _ in self.counted).bit_length()
+
+    @property
+    def counted_word(self) -> str:
+        """The condition that a word is one of those counters."""
+        return " || ".join(f"word == {literal(6, word)}" for word, _ in self.counted)
+
+    @property
+    def counted_events(self) -> str:
+        """The strobes of those counters, each at the place of its word."""
+        ports = {word: f.port for word, f in self.counted}
+        places = range(self.counters - 1, -1, -1)
+        return "{" + ", ".join(ports.get(place, "1'b0") for place in places) + "}"
 
     @property
     def parameters(self) -> list[str]:
@@ -382,6 +411,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
             get("momentary") and (wide or needs or passed or not get("swmod")),
             "momentary is for swmod alone",
         ),
+        (kind == "counter" and node.width == 32 and register.raw_address_offset > 4 * 31, "a long counter is one of the first 32 words"),
         (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
         (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
         (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),

@@ -22,7 +22,7 @@ from cocotb_tools.runner import as_sv_literal, get_runner
 ROOT = Path(__file__).resolve().parent.parent
 BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself
 WAIVERS = [
-    ROOT / "rtl" / "cpu" / "picorv32.vlt"
+    ROOT / "rtl" / "cpu" / "cores.vlt"
 ]  # foreign sources only; our own waivers stand in the line they excuse
 
 
@@ -33,12 +33,13 @@ def package(name):
 
 
 def search_path():
-    """Every folder in which a module is found by its name: the rooms of rtl/, and the soft core's
-    package.
+    """Every folder in which a module is found by its name: the rooms of rtl/, and the packages of
+    the soft cores.
     """
     rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
-    core = package("pythondata_cpu_picorv32")
-    return rooms + ([core / "verilog"] if core else [])
+    cores = package("pythondata_cpu_picorv32"), package("pythondata_cpu_serv")
+    places = "verilog", "verilog/rtl"
+    return rooms + [core / place for core, place in zip(cores, places, strict=True) if core]
 
 
 def source_of(top):

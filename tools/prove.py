@@ -23,11 +23,15 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pythondata_cpu_picorv32  # type: ignore[import-untyped]
+import pythondata_cpu_serv  # type: ignore[import-untyped]
 
 from tools import ROOT
 
 BUILD = ROOT / "build" / "prove"
-CORE = Path(pythondata_cpu_picorv32.data_location) / "picorv32.v"  # the one module that is not ours
+CORES = [  # the modules that are not ours
+    Path(pythondata_cpu_picorv32.data_location) / "picorv32.v",
+    *sorted((Path(pythondata_cpu_serv.data_location) / "rtl").glob("serv_*.v")),
+]
 SOLVER = "yices"
 DEPTH = 20
 LONGEST_S = 240  # of one of the three steps
@@ -155,11 +159,11 @@ def main() -> None:
     parser.add_argument("-j", type=int, default=2, help="so many at once")
     parser.add_argument("-f", action="store_true", help="prove again what is proved already")
     options = parser.parse_args()
-    modules = {p.stem: p for p in [CORE, *sorted((ROOT / "rtl").rglob("*.sv"))]}
+    modules = {p.stem: p for p in [*CORES, *sorted((ROOT / "rtl").rglob("*.sv"))]}
     chosen = [
         p
         for p in modules.values()
-        if p != CORE and "`ifdef FORMAL" in p.read_text() and options.k in str(p.relative_to(ROOT))
+        if p not in CORES and "`ifdef FORMAL" in p.read_text() and options.k in str(p.relative_to(ROOT))
     ]
     if not chosen:
         sys.exit(

@@ -117,7 +117,8 @@ module top (
         .edm_data           (1'b1),
         .peer_rx            (1'b1),
         .sensor_rx          (1'b1),
-        .edm_status         (2'b00)
+        .edm_status         (2'b00),
+        .flash_miso         (1'b0)
     );
 
     assign rs485_tx = usb_tx;

@@ -24,7 +24,8 @@
 module position_capture #(
     parameter int PROBES = 2,   // number of probe inputs
     parameter int TIME_W = 32,  // bits of the time
-    parameter int DEPTH  = 16   // entries, a power of two from 4 up
+    parameter int DEPTH  = 16,  // entries, a power of two from 4 up
+    parameter int ZEROS  = 0    // lowest bits of position that are always 0, 0 to 47
 ) (
     input  wire                           clk,
     input  wire                           rst,                // level: the queue is emptied
@@ -46,7 +47,7 @@ module position_capture #(
     output logic        [$clog2(DEPTH):0] free,               // entries that still fit
     output logic                          overrun             // strobe: an event was dropped
 );
-    localparam int A = $clog2(DEPTH), S = 2 * PROBES + 3, W = S + 16 + TIME_W + 48;
+    localparam int A = $clog2(DEPTH), S = 2 * PROBES + 3, W = S + 16 + TIME_W + 48 - ZEROS;
 
     if (PROBES < 1) begin : g_check_probes
         PROBES_MUST_BE_AT_LEAST_1 u_error ();
@@ -68,13 +69,14 @@ module position_capture #(
     wire [PROBES-1:0] changed = known ? probe ^ probe_q : '0;
     wire [S-1:0] events = {changed & ~probe, changed & probe, software, tick, index} & enabled;
     wire [15:0] age = valid ? 16'd0 : since;
-    wire [W-1:0] entry = {events, age, now, position};
+    wire [W-1:0] entry = {events, age, now, position[47:ZEROS]};
     wire full = free == '0;
     wire take = events != '0 && !full && !clear;
     wire drop = pop && present;
     wire [A:0] read_next = read + (A + 1)'(drop);
 
-    assign {captured_sources, captured_age, captured_time, captured_position} = head;
+    assign {captured_sources, captured_age, captured_time} = head[W-1:48-ZEROS];
+    assign captured_position = 48'(head[47-ZEROS:0]) << ZEROS;
 
     always_ff @(posedge clk) begin
         if (take) memory[written[A-1:0]] <= entry;
@@ -129,6 +131,7 @@ module position_capture #(
             end
             if (drop && read == chosen) waiting <= 1'b0;
         end
+        assume ((position & ~(48'hFFFF_FFFF_FFFF << ZEROS)) == '0);
         if (past && !$past(rst)) begin
             if (known && $past(known)) assert (probe_q == $past(probe));
             assert (stored <= (A + 1)'(DEPTH) && free == (A + 1)'(DEPTH) - stored);

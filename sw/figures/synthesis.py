@@ -22,6 +22,7 @@ PADS = 150  # an inner block has more ports than the ECP5 has pads: it is placed
 ECP5 = ["--25k", "--package", "CABGA256", "--speed", "6"]  # LFE5U-25F-6
 ECP5_CELLS = {"lut": "TRELLIS_COMB", "ff": "TRELLIS_FF", "block_ram": "DP16KD", "dsp": "MULT18X18D"}
 LUT4S = {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}  # that a cell of a netlist takes
+CORES = {"pythondata_cpu_picorv32": "verilog", "pythondata_cpu_serv": "verilog/rtl"}
 ICE40 = ["--hx8k", "--package", "ct256"]
 UP5K = ["--up5k", "--package", "sg48"]
 ELABORATED = Quick(
@@ -65,6 +66,17 @@ def source_of(top: str) -> Path:
     return source
 
 
+def cores() -> list[Path]:
+    """Folders of the soft cores, which come as packages."""
+    folders = []
+    for name, place in CORES.items():
+        package = find_spec(name)
+        if not package or not package.submodule_search_locations:
+            raise SynthesisError(f"the package {name} of a soft core is missing")
+        folders.append(Path(package.submodule_search_locations[0]) / place)
+    return folders
+
+
 def yosys(source: Path, parameters: Parameters, last: str, tag: str) -> Path:
     """The netlist that Yosys writes of a source file's module, in a directory of its own; `last`
     are the passes after the elaboration.
@@ -73,11 +85,7 @@ def yosys(source: Path, parameters: Parameters, last: str, tag: str) -> Path:
     chosen = [f"{name}{Path(str(value)).name}" for name, value in parameters.items()]
     folder = BUILD / re.sub(r"[^\w.-]", "_", "-".join([tag, top, *chosen]))
     folder.mkdir(parents=True, exist_ok=True)
-    package = find_spec("pythondata_cpu_picorv32")
-    if not package or not package.submodule_search_locations:
-        raise SynthesisError("the package of the soft core is missing")
-    core = Path(package.submodule_search_locations[0]) / "verilog"
-    libraries = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")}) + [core]
+    libraries = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")}) + cores()
     netlist = folder / "netlist.json"
     change = "".join(f" -set {name} {quoted(value)}" for name, value in parameters.items())
     passes = [

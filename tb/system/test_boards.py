@@ -6,12 +6,11 @@ node as it is.
 import re
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
-from tb.bench import ROOT
+from tb.bench import ROOT, search_path
 
 BOARDS = sorted(path.parent for path in (ROOT / "constraints").glob("*/board.mk"))
 
@@ -39,11 +38,7 @@ def test_each_port_has_a_pin_of_its_own(board):
 
 @pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.name)
 def test_the_top_fits_the_node(board):
-    core = Path(find_spec("pythondata_cpu_picorv32").submodule_search_locations[0]) / "verilog"
-    directories = " ".join(
-        f"-libdir {directory}"
-        for directory in sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")}) + [core]
-    )
+    directories = " ".join(f"-libdir {directory}" for directory in search_path())
     passes = (
         f"read_verilog -lib +/ecp5/cells_bb.v; read_verilog -sv {board / 'top.sv'}; "
         f"hierarchy -check -top top {directories}"

@@ -112,7 +112,7 @@ def verilator(top, parameters):
             *("--timescale", "1ns/1ps", "+libext+.sv+.v", "--top-module", top),
             *(word for room in search_path() for word in ("-y", room)),
             *(f"-G{name}={value}" for name, value in parameters.items()),
-            *(ROOT / "rtl" / "cpu" / "picorv32.vlt", source_of(top)),
+            *(ROOT / "rtl" / "cpu" / "cores.vlt", source_of(top)),
         ],
         env={**os.environ, "VERILATOR_ROOT": str(folder)},
         capture_output=True,
