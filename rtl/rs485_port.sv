@@ -170,7 +170,10 @@ module rs485_port #(
         .driver_enable(rs485_driver_enable),
         .expired      (transmit_expired)
     );
-    crc32_stream u_crc (
+    // the soft core needs more than 5 cycles for a byte
+    crc32_stream #(
+        .BITS(2)
+    ) u_crc (
         .clk,
         .rst,
         .start(crc_start),

@@ -36,7 +36,9 @@ module position_capture #(
     input  wire         [     PROBES-1:0] probe,              // levels, synchronous to clk
     input  wire         [     TIME_W-1:0] now,                // cycles, the time stamp
     input  wire                           valid,              // strobe: position is new
+    /* verilator lint_off UNUSEDSIGNAL */  // its ZEROS lowest bits are not used
     input  wire signed  [           47:0] position,           // Q32.16 periods
+    /* verilator lint_on UNUSEDSIGNAL */
     input  wire                           pop,                // strobe: remove the head, if any
     input  wire                           clear,              // strobe: empty the queue
     output logic                          present,            // level: the outputs show the head

@@ -35,7 +35,10 @@ module register_memory #(
     parameter int HAS_SINE          = 255,  // axes with sine and cosine
     parameter int HAS_STEPPER       = 255,  // axes with a step generator
     parameter int HAS_VELOCITY      = 255,  // axes with a measured velocity
-    parameter     STYLE             = "auto"  // ram_style of the memory: "huge" takes SB_SPRAM256KA
+    // an attribute uses it:
+    // verilator lint_off UNUSEDPARAM
+    parameter STYLE = "auto"  // ram_style of the memory: "huge" takes SB_SPRAM256KA
+    // verilator lint_on UNUSEDPARAM
 ) (
     input  wire         clk,
     input  wire         rst,

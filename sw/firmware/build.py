@@ -72,16 +72,18 @@ HOT = (  # files in which speed counts more than size: planning, and answers to 
     "planner.c",
     "retarget.c",
 )
+CORES = {  # what the compilers may use of a soft core, as zig and as GNU name it
+    "soft": ("generic_rv32+m-a-f-d+c", "rv32imc"),
+    "serial": ("generic_rv32-m-a-f-d-c", "rv32i"),
+}
 ZIG = [
     "-target",
     "riscv32-freestanding-none",
-    "-mcpu=generic_rv32+m-a-f-d+c",
     "-mabi=ilp32",
     "-fno-sanitize=all",
     "-fno-stack-protector",
 ]
 GNU = [
-    "-march=rv32imc",
     "-misa-spec=2.2",
     "-mabi=ilp32",
     "-nostdlib",
@@ -94,17 +96,18 @@ class BuildError(Exception):
     """One line that says what is wrong."""
 
 
-def compiler() -> tuple[list[str], list[str]]:
-    """The command with its flags, and the libraries that end the link command."""
+def compiler(core: str = "soft") -> tuple[list[str], list[str]]:
+    """The command with its flags for a soft core, and the libraries that end the link command."""
+    zig, gnu = CORES[core]
     cross = os.environ.get("CROSS")
     if cross:
         command = f"{cross}gcc"
         if shutil.which(command) is None:
             raise BuildError(f"{command} was not found (CROSS={cross})")
-        return [command, *GNU], ["-lgcc"]
+        return [command, f"-march={gnu}", *GNU], ["-lgcc"]
     if importlib.util.find_spec("ziglang") is None:
         raise BuildError("no compiler: install ziglang (pip) or set CROSS=riscv64-unknown-elf-")
-    return [sys.executable, "-m", "ziglang", "cc", *ZIG], []
+    return [sys.executable, "-m", "ziglang", "cc", *ZIG, f"-mcpu={zig}"], []
 
 
 def read_elf(path: Path) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
@@ -208,10 +211,11 @@ def defines_of(name: str, axes: int | None = None) -> list[str]:
     ]
 
 
-def stem_of(name: str, axes: int) -> str:
-    """The name of the files of an image for nodes of so many axes."""
+def stem_of(name: str, axes: int, core: str = "soft") -> str:
+    """The name of the files of an image for nodes of so many axes with this soft core."""
     stem = "firmware" if name == "axis" else name
-    return stem if axes == IMAGES[name].usual_axes else f"{stem}_{axes}_axes"
+    stem += "" if axes == IMAGES[name].usual_axes else f"_{axes}_axes"
+    return stem + ("" if core == "soft" else f"_{core}")
 
 
 def flags_of(path: Path) -> list[str]:
@@ -237,16 +241,23 @@ def run(command: Sequence[str]) -> None:
         raise BuildError((errors or lines)[0].strip())
 
 
-def build(memory: int, out: Path, force: bool, name: str = "axis", axes: int | None = None) -> str:
+def build(
+    memory: int,
+    out: Path,
+    force: bool,
+    name: str = "axis",
+    axes: int | None = None,
+    core: str = "soft",
+) -> str:
     """Build an image for nodes of so many axes, or of as many as is usual, and report its size."""
     image = IMAGES[name]
     axes = image.usual_axes if axes is None else axes
     if not 1 <= axes <= image.most_axes:
         raise BuildError(f"the image {name} serves 1 to {image.most_axes} axes, not {axes}")
-    command, libraries = compiler()
+    command, libraries = compiler(core)
     command += defines_of(name, axes)
     sources = [*sources_of(name), LINK, HERE / "build.py"]
-    stem = stem_of(name, axes)
+    stem = stem_of(name, axes, core)
     elf, binary, text, parts, note = (
         out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "parts", "note")
     )
@@ -317,6 +328,9 @@ def main() -> None:
         "--axes", type=int, help="axes of the node (default axis 1, counter 4, station 2)"
     )
     parser.add_argument(
+        "--core", choices=sorted(CORES), default="soft", help="soft core (default soft)"
+    )
+    parser.add_argument(
         "--memory", type=int, default=98304, help="bytes of the soft core's memory (default 98304)"
     )
     parser.add_argument(
@@ -325,7 +339,8 @@ def main() -> None:
     parser.add_argument("--force", action="store_true", help="build even if nothing changed")
     options = parser.parse_args()
     try:
-        print(build(options.memory, options.out, options.force, options.image, options.axes))
+        chosen = options.image, options.axes, options.core
+        print(build(options.memory, options.out, options.force, *chosen))
     except BuildError as error:
         sys.exit(f"firmware: {error}")
 

@@ -414,6 +414,7 @@ def verilate_node(
         "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
+        f"constexpr bool SERIAL_CORE = {'true' if values.get('HAS_SERIAL_CORE') else 'false'};\n"
         f"#define NODE_MEMORY {words[0]}\n{evaluation}"
     )
 
@@ -488,9 +489,9 @@ def twin_library(
     return library
 
 
-def firmware(image: str = "axis", axes: int | None = None) -> list[int]:
+def firmware(image: str = "axis", axes: int | None = None, core: str = "soft") -> list[int]:
     """The words of an image of the firmware for nodes of so many axes, or of as many as is usual,
-    built first when it is not fresh.
+    with this soft core, built first when it is not fresh.
     """
     axes = firmware_build.IMAGES[image].usual_axes if axes is None else axes
     BUILD.mkdir(parents=True, exist_ok=True)
@@ -499,11 +500,12 @@ def firmware(image: str = "axis", axes: int | None = None) -> list[int]:
         run(
             [
                 *[sys.executable, "-m", "firmware.build", "--image", image, "--axes", axes],
-                *["--memory", MEMORY_BYTES],
+                *["--memory", MEMORY_BYTES, "--core", core],
             ],
             "the firmware's build",
         )
-        return words_of(ROOT / "build" / "firmware" / f"{firmware_build.stem_of(image, axes)}.hex")
+        stem = firmware_build.stem_of(image, axes, core)
+        return words_of(ROOT / "build" / "firmware" / f"{stem}.hex")
 
 
 def words_of(file: Path) -> list[int]:

@@ -29,15 +29,21 @@ class Capture:
     def __init__(self, dut):
         self.dut, self.probes, self.depth = dut, int(dut.PROBES.value), int(dut.DEPTH.value)
         self.all = (1 << 2 * self.probes + 3) - 1
+        self.zeros = int(dut.ZEROS.value)
+        self.top = (1 << 48 - self.zeros) - 1  # the bits of a position that are stored
         self.model, self.time = PositionCapture(self.probes, self.depth), 0
 
     async def cycle(self, rst=0, **inputs):
-        """Advance design and model by one cycle; returns (present, entry, free, overrun)."""
+        """Advance design and model by one cycle; returns (present, entry, free, overrun). The
+        design gets positions with ZEROS zeros at their end, the model without them.
+        """
         dut, self.time = self.dut, (self.time + 1) % (1 << len(self.dut.now))
         values = INPUTS | dict(enabled=self.all, now=self.time) | inputs
         dut.rst.value = rst
         for name, value in values.items():
-            getattr(dut, name).value = value
+            getattr(dut, name).value = (
+                (value & self.top) << self.zeros if name == "position" else value
+            )
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         present = int(dut.present.value)
@@ -51,12 +57,16 @@ class Capture:
             if present
             else None
         )
-        got, want = (
-            (present, entry, int(dut.free.value), int(dut.overrun.value)),
-            self.model.step(rst=rst, **values),
-        )
-        assert got == want, f"{got}, the model has {want}"
-        return got
+        got = present, entry, int(dut.free.value), int(dut.overrun.value)
+        want = self.model.step(rst=rst, **values)
+        meant = want[1] and (*want[1][:3], self.placed(want[1][3]))
+        assert got == (want[0], meant, *want[2:]), f"{got}, the model has {want}"
+        return want
+
+    def placed(self, position):
+        """The 48 bits of a position with its zeros, as a signed number."""
+        bits = (position & self.top) << self.zeros
+        return bits - (bits >> 47 << 48)
 
     async def read(self):
         """Read all entries in order; nothing captures meanwhile."""
@@ -207,6 +217,8 @@ async def any_events_match_the_model_in_every_cycle(dut):
         )
 
 
-@pytest.mark.parametrize("probes, time_w, depth", [(2, 32, 16), (1, 64, 4)])
-def test_position_capture(probes, time_w, depth):
-    run("position_capture", __file__, PROBES=probes, TIME_W=time_w, DEPTH=depth)
+@pytest.mark.parametrize(
+    "probes, time_w, depth, zeros", [(2, 32, 16, 0), (1, 64, 4, 0), (2, 32, 16, 14)]
+)
+def test_position_capture(probes, time_w, depth, zeros):
+    run("position_capture", __file__, PROBES=probes, TIME_W=time_w, DEPTH=depth, ZEROS=zeros)

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "nodes/bus.h"
+#include "devices/serial_flash.h"
 #include "machines/machine.h"
 #include "nodes/node_pins.h"
 #include "nodes/peer_line.h"
@@ -39,16 +40,24 @@ class Core {  // a Verilated node and its clock
         set_peripheral_pins(pins, PERIPHERAL_SENSE_IDLE);
         pins.rst = 1;
         model_->eval();
-        std::copy(firmware.begin(), firmware.end(), &pins.NODE_MEMORY[0]);
+        if (SERIAL_CORE)
+            flash_.emplace(firmware);
+        else
+            std::copy(firmware.begin(), firmware.end(), &pins.NODE_MEMORY[0]);
         for (int n = 0; n < RESET_CLK; n++) clk();
         pins.rst = 0;
     }
     ~Core() { model_->final(); }
-    void clk() { rising_edge(pins); }
+    void clk() {
+        rising_edge(pins);
+        if (SERIAL_CORE)
+            pins.flash_miso = flash_->clk(pins.flash_cs_n, pins.flash_sclk, pins.flash_mosi);
+    }
 
  private:
     std::unique_ptr<VerilatedContext> context_;
     std::unique_ptr<Vnode> model_;
+    std::optional<SerialFlash> flash_;
 
  public:
     Vnode___024root& pins;
