@@ -2,8 +2,7 @@
 // flash_loader -- copies the firmware from a serial flash into the memory of the soft core after
 // each reset.
 //
-// latency   64 cycles from the end of rst to the first command; 64 * (PAUSE + WORDS + 2) + 1 cycles
-//           to done
+// latency   64 * (PAUSE + WORDS + 2) cycles from the end of rst to done
 // rate      a word in 64 cycles
 // behaviour SPI mode 0, sclk at half of clk, the highest bit of a byte first. The flash is woken by
 //           command ABh, since an FPGA sends it to sleep after it has read its configuration. After
@@ -115,7 +114,7 @@ module flash_loader #(
         since  <= rst || store ? 7'd1 : since + 7'(since != 7'd64);
         if (past) begin
             if (cs_n) assert (!sclk);
-            assert (done == (stored == (A + 1)'(WORDS)));
+            assert (stored <= (A + 1)'(WORDS) && done == (stored == (A + 1)'(WORDS)));
             if (state != COPYING) assert (stored == '0 && !done);
             if (state == COPYING && !done) assert (count == stored[A-1:0] && !cs_n);
             if (state == PAUSING || done) assert (cs_n);
@@ -125,7 +124,7 @@ module flash_loader #(
             if (store && stored != '0) assert (since == 7'd64);
         end
         if (past && !$past(rst) && $past(done)) assert (done && !store);
-        cover (past && !rst && half == 6'd2);
+        cover (past && sclk && mosi);
     end
 `endif
 endmodule

@@ -49,14 +49,14 @@ module serial_core #(
     wire valid = fetch || load_or_store;
     wire [31:0] access = fetch ? fetch_address : data_address;
     wire in_memory = access < 32'(MEMORY_BYTES);
-    wire in_registers = !fetch && access[31:16] == 16'h8000 && (&bytes || !storing);
+    wire in_registers = !fetch && data_address[31:16] == 16'h8000 && (&bytes || !storing);
     wire done = fetched || answered;
     wire puts = load_or_store && storing && in_memory && !fetched;
     wire [A-3:0] at = loaded ? access[A-1:2] : (A - 2)'(loaded_at);
 
     assign select  = valid && in_registers && ready && !awaited && !answered && !trap;
     assign write   = storing;
-    assign address = access[15:0];
+    assign address = data_address[15:0];
 
     always_ff @(posedge clk) begin
         fetched  <= valid && in_memory && !fetched && !trap;
