@@ -411,7 +411,10 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
             get("momentary") and (wide or needs or passed or not get("swmod")),
             "momentary is for swmod alone",
         ),
-        (kind == "counter" and node.width == 32 and register.raw_address_offset > 4 * 31, "a long counter is one of the first 32 words"),
+        (
+            kind == "counter" and node.width == 32 and register.raw_address_offset > 4 * 31,
+            "a long counter is one of the first 32 words",
+        ),
         (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
         (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
         (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),

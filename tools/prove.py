@@ -163,7 +163,9 @@ def main() -> None:
     chosen = [
         p
         for p in modules.values()
-        if p not in CORES and "`ifdef FORMAL" in p.read_text() and options.k in str(p.relative_to(ROOT))
+        if p not in CORES
+        and "`ifdef FORMAL" in p.read_text()
+        and options.k in str(p.relative_to(ROOT))
     ]
     if not chosen:
         sys.exit(

@@ -19,18 +19,18 @@ module flash_loader #(
     parameter int START = 131072,  // byte address of the first word in the flash
     parameter int PAUSE = 64       // periods of 64 cycles until the flash is awake, 1 to WORDS - 1
 ) (
-    input  wire                     clk,
-    input  wire                     rst,
+    input  wire                      clk,
+    input  wire                      rst,
     // flash
-    output logic                    cs_n,     // pin, low during a command
-    output logic                    sclk,     // pin, idles low
-    output logic                    mosi,     // pin, data to the flash
-    input  wire                     miso,     // pin, data of the flash, synchronous to sclk
+    output logic                     cs_n,     // pin, low during a command
+    output logic                     sclk,     // pin, idles low
+    output logic                     mosi,     // pin, data to the flash
+    input  wire                      miso,     // pin, data of the flash, synchronous to sclk
     // memory
-    output logic                    store,    // strobe: word is to be stored at address
+    output logic                     store,    // strobe: word is to be stored at address
     output logic [$clog2(WORDS)-1:0] address,  // number of a word
-    output logic [            31:0] word,     // value
-    output logic                    done      // level: all words are stored
+    output logic [             31:0] word,     // value
+    output logic                     done      // level: all words are stored
 );
     localparam int A = $clog2(WORDS);
     localparam [31:0] WAKE = 32'hAB00_0000, READ = {8'h03, 24'(START)};
@@ -49,13 +49,13 @@ module flash_loader #(
         COPYING
     } state_t;
 
-    state_t state;
-    logic [5:0] half;  // half periods of sclk since the last 32 bits
-    logic [31:0] shifted;  // bits to send from the highest one on, bits received from the lowest
-    logic [A-1:0] count;  // of the periods of 64 cycles in this state
+    state_t         state;
+    logic   [  5:0] half;  // half periods of sclk since the last 32 bits
+    logic   [ 31:0] shifted;  // bits to send from the highest one on, bits received from the lowest
+    logic   [A-1:0] count;  // of the periods of 64 cycles in this state
 
-    wire last = half == 6'd63;
-    wire [31:0] received = {shifted[30:0], miso};
+    wire            last = half == 6'd63;
+    wire    [ 31:0] received = {shifted[30:0], miso};
 
     assign mosi    = shifted[31];
     assign sclk    = half[0] && !cs_n;
@@ -104,7 +104,7 @@ module flash_loader #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic       past = 1'b0;
     logic [A:0] stored;  // words since rst
     logic [6:0] since;  // cycles since the last word, at most 64
     always @(posedge clk) begin

@@ -17,9 +17,9 @@
 `default_nettype none
 
 module serial_core #(
-    parameter int MEMORY_BYTES = 65536,  // bytes, a multiple of 1024
+    parameter int MEMORY_BYTES  = 65536,  // bytes, a multiple of 1024
     parameter int PROGRAM_BYTES = 32768,  // bytes that are copied, a power of two
-    parameter int FLASH_START = 131072  // byte address of the program in the flash
+    parameter int FLASH_START   = 131072  // byte address of the program in the flash
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -41,17 +41,17 @@ module serial_core #(
 
     wire fetch, load_or_store, storing, loads, loaded;
     wire [31:0] fetch_address, data_address, memory_rdata, loaded_word;
-    wire [ 3:0] bytes;
+    wire [  3:0] bytes;
     wire [P-3:0] loaded_at;
     // the memory has answered; the registers will answer in the next cycle, have answered
     logic fetched, awaited, answered;
 
-    wire valid = fetch || load_or_store;
-    wire [31:0] access = fetch ? fetch_address : data_address;
-    wire in_memory = access < 32'(MEMORY_BYTES);
-    wire in_registers = !fetch && data_address[31:16] == 16'h8000 && (&bytes || !storing);
-    wire done = fetched || answered;
-    wire puts = load_or_store && storing && in_memory && !fetched;
+    wire         valid = fetch || load_or_store;
+    wire [ 31:0] access = fetch ? fetch_address : data_address;
+    wire         in_memory = access < 32'(MEMORY_BYTES);
+    wire         in_registers = !fetch && data_address[31:16] == 16'h8000 && (&bytes || !storing);
+    wire         done = fetched || answered;
+    wire         puts = load_or_store && storing && in_memory && !fetched;
     wire [A-3:0] at = loaded ? access[A-1:2] : (A - 2)'(loaded_at);
 
     assign select  = valid && in_registers && ready && !awaited && !answered && !trap;

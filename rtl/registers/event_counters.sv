@@ -35,28 +35,28 @@ module event_counters #(
     end
 
     // never read at the place at which it is written
-    (* no_rw_check *)logic [W-1:0] memory[0:COUNTERS-1];
+    (* no_rw_check *)logic [       W-1:0] memory                                                   [0:COUNTERS-1];
     logic [COUNTERS-1:0] waiting;  // an event is not counted yet
-    logic [A:0] cleared;  // counters that are 0 since rst; then COUNTERS
-    logic raising;  // count is the one that is raised
-    logic [A-1:0] raised;  // its counter
+    logic [         A:0] cleared;  // counters that are 0 since rst; then COUNTERS
+    logic                raising;  // count is the one that is raised
+    logic [       A-1:0] raised;  // its counter
 
-    logic [A-1:0] first;  // the lowest counter of which an event waits
+    logic [       A-1:0] first;  // the lowest counter of which an event waits
     always_comb begin
         first = '0;
         for (int n = COUNTERS - 1; n >= 0; n--) if (waiting[n]) first = A'(n);
     end
 
-    wire ready = cleared[A];
-    wire start = ready && waiting != '0 && !raising && !read && !clear;
-    wire put_off = raising && (read || clear);
-    wire store = raising && !put_off && !(&count);
-    wire zero = clear || !ready;
+    wire         ready = cleared[A];
+    wire         start = ready && waiting != '0 && !raising && !read && !clear;
+    wire         put_off = raising && (read || clear);
+    wire         store = raising && !put_off && !(&count);
+    wire         zero = clear || !ready;
     wire [A-1:0] place = !ready ? cleared[A-1:0] : clear ? number : raised;
 
     always_ff @(posedge clk) begin
         if (zero || store) memory[place] <= zero ? '0 : count + 1'b1;
-        if (read || start) count <= memory[read ? number : first];
+        if (read || start) count <= memory[read?number : first];
     end
 
     always_ff @(posedge clk) begin
@@ -77,13 +77,13 @@ module event_counters #(
 
 `ifdef FORMAL
     (* anyconst *)logic [A-1:0] observed;  // a counter
-    logic past = 1'b0;
+    logic         past = 1'b0;
     logic [W-1:0] events_so_far;  // since its last clear, at most the largest count
-    logic asked;  // its count was read in the cycle before
-    logic [W:0] answer;  // count and waiting event in that cycle
-    wire in_work = raising && raised == observed;
-    wire [W:0] known = {1'b0, memory[observed]} + (W + 1)'(waiting[observed] || in_work);
-    wire [W-1:0] reached = known[W] ? '1 : known[W-1:0];
+    logic         asked;  // its count was read in the cycle before
+    logic [  W:0] answer;  // count and waiting event in that cycle
+    wire          in_work = raising && raised == observed;
+    wire  [  W:0] known = {1'b0, memory[observed]} + (W + 1)'(waiting[observed] || in_work);
+    wire  [W-1:0] reached = known[W] ? '1 : known[W-1:0];
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);

@@ -21,23 +21,23 @@
 `default_nettype none
 
 module register_memory #(
-    parameter int AXES              = 1,    // axes of the node, 1 to 8
-    parameter int FILTERS           = 255,  // bit n: axes with biquads of the servo
-    parameter int HAS_BRIDGE        = 255,  // axes with a bridge
-    parameter int HAS_COMPARE       = 255,  // axes with compare
-    parameter int HAS_DAC           = 255,  // axes with a DAC
-    parameter int HAS_DRIVE         = 255,  // axes with a drive
-    parameter int HAS_ENCODER_CHECK = 255,  // axes with the check of the encoder
-    parameter int HAS_FINE_STAGE    = 255,  // axes with a fine stage
-    parameter int HAS_HARMONICS     = 255,  // axes with harmonic correction
-    parameter int HAS_MONITOR       = 255,  // axes with a signal monitor
-    parameter int HAS_RECORDER      = 255,  // axes with a recorder
-    parameter int HAS_SINE          = 255,  // axes with sine and cosine
-    parameter int HAS_STEPPER       = 255,  // axes with a step generator
-    parameter int HAS_VELOCITY      = 255,  // axes with a measured velocity
+    parameter int AXES              = 1,      // axes of the node, 1 to 8
+    parameter int FILTERS           = 255,    // bit n: axes with biquads of the servo
+    parameter int HAS_BRIDGE        = 255,    // axes with a bridge
+    parameter int HAS_COMPARE       = 255,    // axes with compare
+    parameter int HAS_DAC           = 255,    // axes with a DAC
+    parameter int HAS_DRIVE         = 255,    // axes with a drive
+    parameter int HAS_ENCODER_CHECK = 255,    // axes with the check of the encoder
+    parameter int HAS_FINE_STAGE    = 255,    // axes with a fine stage
+    parameter int HAS_HARMONICS     = 255,    // axes with harmonic correction
+    parameter int HAS_MONITOR       = 255,    // axes with a signal monitor
+    parameter int HAS_RECORDER      = 255,    // axes with a recorder
+    parameter int HAS_SINE          = 255,    // axes with sine and cosine
+    parameter int HAS_STEPPER       = 255,    // axes with a step generator
+    parameter int HAS_VELOCITY      = 255,    // axes with a measured velocity
     // an attribute uses it:
     // verilator lint_off UNUSEDPARAM
-    parameter STYLE = "auto"  // ram_style of the memory: "huge" takes SB_SPRAM256KA
+    parameter     STYLE             = "auto"  // ram_style of the memory: "huge" takes SB_SPRAM256KA
     // verilator lint_on UNUSEDPARAM
 ) (
     input  wire         clk,
@@ -56,7 +56,7 @@ module register_memory #(
 );
     localparam int W = $clog2(3 + 3 * AXES) + 6;  // bits of a place in the memory
 
-    (* ram_style = STYLE *)logic [31:0] memory[0:2**W-1];
+    (* ram_style = STYLE *)logic [ 31:0] memory                                          [0:2**W-1];
     logic [ 11:0] count;  // words that have their first value
     logic         commit;  // the low word is stored in this cycle
     logic [W-1:0] low_place;

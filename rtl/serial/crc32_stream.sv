@@ -48,7 +48,7 @@ module crc32_stream #(
         logic [STEPS-1:0] left;  // one bit for each step that is still to be made
 
         // the first byte of a frame: added to the remainder that the start gives
-        wire [31:0] from = start ? '1 : remainder;
+        wire  [     31:0] from = start ? '1 : remainder;
 
         always_ff @(posedge clk) begin
             if (valid) remainder <= from ^ {24'd0, data};

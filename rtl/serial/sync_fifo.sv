@@ -30,7 +30,7 @@ module sync_fifo #(
     end
 
     // a row that is read while it is written is not shown
-    (* no_rw_check *)logic [W-1:0] memory[0:DEPTH-1];
+    (* no_rw_check *) logic [W-1:0] memory[0:DEPTH-1];
     // counts of words; one bit more than an address distinguishes full from empty
     logic [A:0] written, read;
 

@@ -27,17 +27,17 @@ module counter_box_bench #(
     wire edm_data_low, peer_tx, display_cs_n, display_sclk, display_data;
 
     node #(
-        .CLK_HZ      (CLK_HZ),
-        .AXES        (4),
-        .FILTERS     (0),
-        .HAS_SINE    (0),
-        .HAS_COMPARE (0),
+        .CLK_HZ           (CLK_HZ),
+        .AXES             (4),
+        .FILTERS          (0),
+        .HAS_SINE         (0),
+        .HAS_COMPARE      (0),
         .HAS_ENCODER_CHECK(0),
-        .HAS_VELOCITY(0),
-        .HAS_DRIVE   (0),
-        .HAS_SERIAL_CORE(1),
-        .MEMORY_BYTES(65536),
-        .REGISTER_STYLE("huge")
+        .HAS_VELOCITY     (0),
+        .HAS_DRIVE        (0),
+        .HAS_SERIAL_CORE  (1),
+        .MEMORY_BYTES     (65536),
+        .REGISTER_STYLE   ("huge")
     ) u_node (
         .clk,
         .rst,

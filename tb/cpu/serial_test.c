@@ -30,9 +30,9 @@ typedef unsigned char u8;
         __asm__ volatile(mnemonic " %0, %1, %2" : "=r"(r) : "r"(a), "i"(number)); \
         RESULT = r;                                                               \
     } while (0)
-#define BRANCH(mnemonic, bit)                                      \
+#define BRANCH(mnemonic, bit)                                               \
     __asm__ volatile(mnemonic " %1, %2, 1f\n j 2f\n 1: ori %0, %0, %3\n 2:" \
-                     : "+r"(taken)                                 \
+                     : "+r"(taken)                                          \
                      : "r"(a), "r"(b), "i"(bit))
 
 __asm__(
