@@ -65,6 +65,7 @@ S0_NODE: Parameters = {
 # a node that counts A/B/Z with index, filters and captures; its firmware is in the SPRAM
 COUNTER_BOX = Path(__file__).with_name("counter_box_bench.sv")
 SPRAM = "-spram -dsp"
+FULL = ("--router", "router2")  # finds the ways through a part that is nearly full
 OF_BOTH: dict[str, Parameters] = {
     "compare": {"HAS_COMPARE": ALL_AXES},
     "capture queue": {"HAS_CAPTURE": ALL_AXES},
@@ -160,7 +161,7 @@ def on_up5k(seed: int) -> dict[str, float]:
     """{lc, fmax_mhz} of the node that counts, the worst of some placements."""
     netlist = netlist_of(COUNTER_BOX, {}, "ice40", 1, SPRAM)
     tries = [
-        placed(netlist, "ice40", UP5K, 20, one, "--pcf-allow-unconstrained")
+        placed(netlist, "ice40", UP5K, 20, one, "--pcf-allow-unconstrained", *FULL)
         for one in seeds(seed, PLACEMENTS)
     ]
     used = tries[0][1]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The results that tb/cpu/serial_test.c must write: those of rv32i for two operands, in the order in
-which the program writes them.
+"""The results that tb/cpu/serial_test.c must write: those of rv32i for two operands, in the order
+in which the program writes them.
 """
 
 from tb.cpu.soft_core import MASK, signed

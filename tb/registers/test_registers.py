@@ -113,6 +113,13 @@ class Bus:
     async def write(self, word, wdata, **inputs):
         return await self.clk(1, 1, word, wdata, **inputs)
 
+    async def count(self, port, times, pause):
+        """So many events, each with the cycles that it takes."""
+        for _ in range(times):
+            await self.clk(**{port: 1})
+            for _ in range(pause):
+                await self.clk()
+
     def noise(self):
         return {name: random.getrandbits(self.width[name]) for name in self.inputs}
 
@@ -242,14 +249,7 @@ async def counters_count_clear_and_stop_at_the_end(dut):
     bus = await Bus(dut).begin()
     for r, f in bus.of("counter"):
         port, pause = f.port, 2 if f.in_memory else 0
-
-        async def event(times):
-            for _ in range(times):
-                await bus.clk(**{port: 1})
-                for _ in range(pause):
-                    await bus.clk()
-
-        await event(3)
+        await bus.count(port, 3, pause)
         assert await bus.read(r.word) == 3 << f.low
         await bus.write(r.word, WORD, **{port: 1})
         for _ in range(pause):
@@ -261,7 +261,7 @@ async def counters_count_clear_and_stop_at_the_end(dut):
         else:
             getattr(dut.u_block, f"{port}_count").value = bus.model.value[port] = (1 << f.width) - 2
         await FallingEdge(dut.clk)
-        await event(3)
+        await bus.count(port, 3, pause)
         assert await bus.read(r.word) == (1 << f.width) - 1 << f.low
         await bus.write(r.word, 0)
         assert await bus.read(r.word) == 0

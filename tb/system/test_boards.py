@@ -6,7 +6,6 @@ node as it is.
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
