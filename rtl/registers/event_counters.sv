@@ -34,8 +34,8 @@ module event_counters #(
         COUNTERS_MUST_BE_A_POWER_OF_TWO_FROM_2_UP u_error ();
     end
 
-    // never read at the place at which it is written
-    (* no_rw_check *)logic [       W-1:0] memory                                                   [0:COUNTERS-1];
+    (* no_rw_check *)logic [W-1:0] memory[0:COUNTERS-1];  // never read where it is written
+
     logic [COUNTERS-1:0] waiting;  // an event is not counted yet
     logic [         A:0] cleared;  // counters that are 0 since rst; then COUNTERS
     logic                raising;  // count is the one that is raised
