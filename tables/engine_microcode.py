@@ -20,7 +20,7 @@ from pathlib import Path
 
 from tables import made_files
 
-RTL = Path(__file__).resolve().parent.parent / "rtl" / "control"
+RTL = made_files.ROOT / "rtl" / "control"
 MADE = RTL / "engine_microcode.sv"
 MEMORY = RTL / "engine_memory.sv"
 PROOF = RTL / "engine_regions.sv"

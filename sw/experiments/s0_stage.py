@@ -22,13 +22,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from experiments.report_page import ROOT
 from moire.analysis import report
 from moire.client.axis import Axis
 from moire.client.bus import Bus
 from moire.client.records import Identity, Status
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport
+from twin.build import ROOT
 from twin.nodes.twin import CLK_HZ
 
 ADDRESSES = {"X": 1, "Y": 2}  # on the bus; the axes of the twin have the same order

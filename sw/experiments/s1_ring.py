@@ -25,14 +25,13 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments import report_page
-from experiments.report_page import ROOT
 from moire.analysis import report
 from moire.analysis.harmonic_fit import Harmonics, Readings, fit, read_readings
 from moire.bus.transport import BITS, Transport
 from moire.client.relay import Relay, Settings, Status, make_set, terms_of
 from moire.errors import BadFile, MoireError
 from twin import BuildError
-from twin.build import simulation
+from twin.build import ROOT, simulation
 from twin.machines.ring import ARC_SECOND, RotaryRing
 
 DRIVER, RELAY = Path(__file__).with_name("relay_serve.cpp"), ROOT / "rtl" / "relay.sv"

@@ -26,7 +26,7 @@ from typing import Self
 from rich.console import Console
 from rich.table import Table
 
-from experiments.report_page import ROOT, page, picture
+from experiments.report_page import page, picture
 from moire.analysis import report
 from moire.client.axis import Axis as ClientAxis
 from moire.client.bus import Bus
@@ -34,6 +34,7 @@ from moire.client.records import Status
 from moire.errors import MoireError
 from moire.units import Value
 from twin import BuildError, Twin, TwinTransport
+from twin.build import ROOT
 from twin.nodes.twin import Axis, Node, drives
 
 CLK_HZ = 4_800_000  # the motion engine needs 1171 cycles a tick for three axes

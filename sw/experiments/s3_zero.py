@@ -22,13 +22,14 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from experiments.report_page import ROOT, page, picture
+from experiments.report_page import page, picture
 from moire.analysis import report
 from moire.client.bus import Bus
 from moire.client.records import Status
 from moire.errors import MoireError
 from moire.units import Value
 from twin import BuildError, Twin, TwinTransport
+from twin.build import ROOT
 from twin.machines.machine import Trace
 from twin.nodes.twin import Axis, Node, drives
 from twin.parameters import tables as parameters

@@ -29,7 +29,7 @@ from typing import Self
 from rich.console import Console
 from rich.table import Table as Rows
 
-from experiments.report_page import ROOT, page, picture
+from experiments.report_page import page, picture
 from moire.analysis import report
 from moire.client.bus import Bus
 from moire.client.indexing_table import TURN, IndexingTable
@@ -40,6 +40,7 @@ from moire.client.settings import Settings
 from moire.errors import MoireError
 from moire.units import Value
 from twin import Axis, BuildError, Devices, Node, Twin, TwinTransport, build
+from twin.build import ROOT
 from twin.nodes.twin import drives
 
 MAIN, SUB = 0, 1  # numbers of the nodes in the twin

@@ -6,9 +6,9 @@ large it becomes.
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, console
+from figures.common import Figure, Quick, console
 from figures.synthesis import ELABORATED, elaborated, source_of, synthesise
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 ARCTAN = ROOT / "rtl" / "interpolate" / "arctan_pipelined.sv"
 SWEEP = Path(__file__).with_name("arctan_sweep.cpp")

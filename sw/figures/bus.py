@@ -13,12 +13,12 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, bar, console, shares
+from figures.common import Figure, Quick, bar, console, shares
 from moire.bus.protocol import parse_reply, read_words
 from moire.client.bus import Bus
 from moire.errors import BusError
 from twin import Node, Twin, TwinTransport
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 RTL = ROOT / "rtl" / "rs485_port.sv"
 DRIVER = Path(__file__).with_name("bus_run.cpp")

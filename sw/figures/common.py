@@ -19,7 +19,6 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
 TOOLS = {  # modules here that measure nothing
     "__init__",
     "common",

@@ -8,9 +8,9 @@ The campaign of 10^9 edges is `make soak K=decoder`.
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, elaborated, source_of, synthesise_ice40
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 ENCODER = ROOT / "rtl" / "decode" / "incremental_encoder.sv"
 DRIVER = Path(__file__).with_name("encoder_run.cpp")

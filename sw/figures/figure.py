@@ -22,12 +22,12 @@ from importlib import import_module
 from multiprocessing import get_context
 
 from figures import record
-from figures.common import ROOT, Figure, collected, console, modules
+from figures.common import Figure, collected, console, modules
 from figures.comparison import page
 from figures.synthesis import SynthesisError
 from moire.errors import MoireError
 from twin import BuildError
-from twin.build import SHORT_RUNS
+from twin.build import ROOT, SHORT_RUNS
 
 PAGE = ROOT / "build" / "report" / "figures.html"
 PROCESSES = 2

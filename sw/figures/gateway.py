@@ -17,12 +17,13 @@ from typing import NamedTuple
 
 import serial
 
-from figures.common import ROOT, Figure, Quick, console
+from figures.common import Figure, Quick, console
 from firmware import build as firmware_build
 from fuzz import parser_fuzz
 from moire.bus import cobs
 from moire.bus.protocol import parse_reply, request_body
 from moire.errors import MoireError
+from twin.build import ROOT
 
 FIRMWARE = ROOT / "sw" / "firmware"
 READ_S = 10

@@ -15,12 +15,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from figures.common import ROOT, Figure, Quick, bar, console, shares
+from figures.common import Figure, Quick, bar, console, shares
 from firmware import build as firmware_build
 from moire import Bus
 from moire.client.axis import Axis as BusAxis
 from moire.errors import BusError, Refused
 from twin import Axis, Node, Twin, TwinTransport, build
+from twin.build import ROOT
 
 DRIVER = Path(__file__).with_name("interlock_run.cpp")
 BENCH = Path(__file__).with_name("one_axis_bench.sv")

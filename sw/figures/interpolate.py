@@ -5,9 +5,9 @@ large it is.
 
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, console
+from figures.common import Figure, Quick, console
 from figures.synthesis import ECP5, ECP5_CELLS, ELABORATED, elaborated, netlist_of, placed
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 HERE = Path(__file__).resolve().parent
 CHANNEL = ROOT / "rtl" / "feedback_channel.sv"

@@ -11,9 +11,9 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from twin import BuildError
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 PASS = ROOT / "rtl" / "peripheral" / "ps2_pass.sv"
 DRIVER = Path(__file__).with_name("ps2_run.cpp")

@@ -10,9 +10,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, UP5K, elaborated, netlist_of, placed, source_of
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 RELAY = ROOT / "rtl" / "relay.sv"
 DRIVER = Path(__file__).with_name("relay_run.cpp")

@@ -8,9 +8,9 @@ The campaign of 10^8 reversals is `make soak K=steps`.
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, elaborated, synthesise_ice40
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 DRIVER = Path(__file__).with_name("steps_run.cpp")
 BENCH = Path(__file__).with_name("steps_bench.sv")

@@ -15,7 +15,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from figures.common import ROOT, Quick
+from figures.common import Quick
+from twin.build import ROOT
 
 BUILD = ROOT / "build" / "synthesis"
 PADS = 150  # an inner block has more ports than the ECP5 has pads: it is placed without any

@@ -53,7 +53,7 @@ class Session:
             transport = self.open_transport(self.options)
             if self.options.record:
                 transport = ports.recorded(transport, self.options.record)
-            self.opened = Bus(transport)
+            self.opened = Bus(transport, answer_s=float(self.options.patience))
         return self.opened
 
     def carry_out(self, planned: Planned) -> None:
