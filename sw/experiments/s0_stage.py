@@ -35,6 +35,10 @@ ADDRESSES = {"X": 1, "Y": 2}  # on the bus; the axes of the twin have the same o
 PERIOD_NM = 800.0
 POLL_S = 0.005  # between two polls of a motion
 MOVES = 24
+LEFT_OUT = (
+    "errors of the scale along its travel, temperature, vibration of the floor, drift of the "
+    "signals, noise of the amplifiers and of the DAC"
+)
 
 Statuses = Mapping[str, Status]  # the status of each axis, by its name
 
@@ -284,12 +288,14 @@ def run(
             "margin of the phase zero at homing (1: certain, 0: ambiguous)": margins,
             "bus": f"{stage.bus.statistics.exchanges} exchanges, "
             f"{stage.bus.statistics.repeats} repeated",
+            "what the model leaves out": LEFT_OUT,
             "again": f"build/venv/bin/python -m experiments.s0_stage --seed {seed} --moves {count}",
         },
     )
     path = report.write(result, folder)
     console.print(
-        f"largest error {errors.largest:.1f} nm, rms {errors.rms:.1f} nm (paper: below 800 nm); "
+        f"largest error {errors.largest:.1f} nm, rms {errors.rms:.1f} nm "
+        "(the paper's real stage: below 800 nm); "
         f"{simulated:.1f} s simulated in {wall:.0f} s"
     )
     console.print(f"report with pictures: {path}", soft_wrap=True)

@@ -430,12 +430,14 @@ def run(
         "indicates only the direction of the last pulse. The position of the node has 48 bits and "
         "a sign.",
         [
-            report.table(("", "paper", "here", ""), compared),
+            report.table(report.AGAINST_THE_PAPER, compared),
             pictures(stage),
             report.table(HEAD, rows(made), text_columns=2),
         ],
         {
             "simulated time": f"{stage.bus.transport.now():.1f} s",
+            "what the model leaves out": "errors of the scales and of their edges, noise on the "
+            "levels, temperature",
             "again": f"build/venv/bin/python -m experiments.s2_stage --seed {seed}",
         },
     )

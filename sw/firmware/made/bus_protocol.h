@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x391503CDu    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x6002DF55u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -182,9 +182,10 @@ enum bus_signal_fault {    // bits
 
 enum bus_calibration_action {
     BUS_CALIBRATION_ACTION_READ = 0,    // change nothing, only report
-    BUS_CALIBRATION_ACTION_CALIBRATE = 1,    // calibrate from now on
-    BUS_CALIBRATION_ACTION_FREEZE = 2,    // stop the calibration; the correction stays in use
-    BUS_CALIBRATION_ACTION_CLEAR = 3,    // remove the correction and start again
+    BUS_CALIBRATION_ACTION_CALIBRATE = 1,    // calibrate during every motion from now on
+    BUS_CALIBRATION_ACTION_FREEZE = 2,    // stop the calibration; the correction stays in force
+    // remove the correction: nothing is corrected any more, and a calibration starts again
+    BUS_CALIBRATION_ACTION_CLEAR = 3,
 };
 
 enum bus_scope_trigger {
@@ -908,8 +909,8 @@ enum bus_parameter {
     BUS_PARAMETER_SIGNAL_BALANCE = 47,
     // signal: largest good amplitude times sine of the phase error; 65535 off
     BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR = 48,
-    // position from: 0 interpolated sine and cosine (needs SINE, else 1 is the default), 1 counts
-    // of A/B, 2 the steps that the axis sends
+    // position from: 0 interpolated sine and cosine (needs HAS_SINE, else 1 is the default), 1
+    // counts of A/B, 2 the steps that the axis sends
     BUS_PARAMETER_POSITION_SOURCE = 49,
     // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, distance, phase zero),
     // -2 S3 (index on either side)

@@ -144,7 +144,7 @@ void stage_frame(Bench* bench, double position, int count, uint8_t* bits) {
 // present cycle on.
 void stage_levels(Bench* bench, uint64_t clk, double from, double speed, uint8_t* out) {
     for (uint64_t n = 0; n < clk; n++) {
-        stage_of(bench).look(++bench->now, from + speed * double(n) / bench->clk_hz);
+        stage_of(bench).levels_at(++bench->now, from + speed * double(n) / bench->clk_hz);
         out[n] = uint8_t(bench->machine->levels() & (ENCODER_A | ENCODER_B));
     }
 }

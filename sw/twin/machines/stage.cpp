@@ -39,7 +39,7 @@ void Stage::move(uint64_t now) {
 }
 
 uint64_t Stage::sense(uint64_t now) {
-    const uint64_t spike = look(now, position(now));
+    const uint64_t spike = levels_at(now, position(now));
     const bool moves = std::fabs(velocity()) * time_step() > 1e-9;
     return moves ? std::min(spike, now + std::max<uint64_t>(1, step_clk() / LEVELS_PER_STEP))
                  : spike;

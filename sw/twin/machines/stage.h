@@ -33,7 +33,9 @@ class Stage : public Machine {
         return plant.drivetrain.position + piezo.position + velocity() * since(now);
     }
     double velocity() const { return plant.drivetrain.velocity + piezo.velocity; }
-    uint64_t look(uint64_t now, double position) { return interferometer.advance(now, position); }
+    uint64_t levels_at(uint64_t now, double position) {
+        return interferometer.advance(now, position);
+    }
 
  protected:
     unsigned pins() const override {

@@ -3,15 +3,16 @@
 // and cosine through two converters that sample together, and the comparators' quadrature levels
 // with their spikes.
 //
-//   phase  = 2 pi (position + scale error - grating_offset) / period          sine = sin(phase)
-//   cosine = cos(phase), with their errors:
-//            harmonics +-2 ... +-8 are added to exp(i phase) first, then gain, phase and offset
-//            bend it
-//   levels   A = cosine > 0, B = sine > 0: at a rising edge of A, B = 0 means forward (S0)
-//   frame    AD7356 class: sampled at the falling edge of cs_n, which also puts out the first
-//   leading zero; each falling edge of
-//            sclk puts out the next bit: second leading zero, then the word, MSB first, straight
-//            binary, then zeros
+//   phase  = 2 pi (position + scale error - grating_offset) / period
+//   sine   = sin(phase) and cosine = cos(phase), with their errors
+//   levels: A = cosine > 0, B = sine > 0
+//
+// Of the errors, the harmonics +-2 ... +-8 are added to exp(i phase) first, then gain, phase error
+// and offset. At a rising edge of A, B = 0 means forward (S0).
+//
+// The frame is that of the AD7356 class. The falling edge of cs_n samples and puts out the first
+// leading zero; each falling edge of sclk puts out the next bit: the second leading zero, then the
+// word in straight binary, MSB first, then zeros.
 #pragma once
 #include <cstdint>
 

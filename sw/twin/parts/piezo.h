@@ -2,13 +2,12 @@
 // Fine stage: amplifier with a slew limit, piezo with hysteresis and creep, a flexure with its
 // first mode, a mass on it.
 //
-//   hysteresis  Prandtl-Ishlinskii: y = w0 u + w sum play(u, r_i); the weights follow from the
-//   range, which the full loop reaches, and
-//               the width of that loop at its middle
-//   creep       nearly logarithmic: two relaxations per decade from 10 ms to 1000 s, together
-//   `creep` of
-//               the travel per decade
+//   hysteresis  y = w0 u + w sum play(u, r_i), as Prandtl and Ishlinskii have it
 //   mode        x'' + 2 d w x' + w^2 x = w^2 y
+//
+// The weights of the hysteresis follow from the range, which the full loop reaches, and from the
+// width of that loop at its middle. The creep is nearly logarithmic: two relaxations per decade
+// from 10 ms to 1000 s, which together make `creep` of the travel per decade.
 #pragma once
 #include <array>
 #include <cmath>

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Error of a scale along its travel: the indicated position minus the true position.
 //
-//   error = linear x + cyclic sin(2 pi x / pitch) + a random walk: independent normal steps every
-//   WALK_STEP, straight lines between
-//           them, 0 at x = 0 in each part
+//   error = linear x + cyclic sin(2 pi x / pitch) + walk(x)
+//
+// The walk has independent normal steps every WALK_STEP and straight lines between them. Each part
+// is 0 at x = 0.
 #pragma once
 #include <array>
 #include <cmath>
