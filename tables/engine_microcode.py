@@ -9,7 +9,7 @@ undivided to a word. Effects and jobs are in the tables below.
 
 The engine works on three lines at once: it fetches one while it reads the operand of the line
 before and adds up the line before that. So what a line changes is known DISTANCE lines later. Where
-the program wants it sooner, the assembler inserts lines that only pass acc on.
+the program needs it sooner, the assembler inserts lines that only pass acc on.
 """
 
 import re

@@ -17,8 +17,8 @@ SEED = 1  # of the placement; not picked, others are within 5 % of it
 
 def worst(w: int, least: float) -> float:
     """LSB, over every sample whose radius is at least this share of full scale."""
-    told = run([simulation(SWEEP, ARCTAN, W=w), w, least], "arctan sweep").split()
-    pairs, lsb, wrong, counts = told
+    printed = run([simulation(SWEEP, ARCTAN, W=w), w, least], "arctan sweep").split()
+    pairs, lsb, wrong, counts = printed
     console.print(
         f"{pairs} samples of {w} bits: {wrong} not correctly rounded, "
         f"amplitude within {counts} counts"

@@ -77,7 +77,7 @@ class Figure:
         return "seed" in inspect.signature(self.measure).parameters
 
     @property
-    def wanted(self) -> str:
+    def bound_words(self) -> str:
         return f"{self.bound} ({self.note})" if self.note else self.bound
 
     def good(self, value: float) -> bool:

@@ -19,7 +19,7 @@ LEADING = 2  # bits that it sends before them
 
 
 def interpolate_latency_clk() -> float:
-    """One word is sent through rtl/feedback_channel.sv, of which only the ports are looked at."""
+    """One word is sent through rtl/feedback_channel.sv, of which only the ports are read."""
     program = simulation(DRIVER, CHANNEL, W=W)
     return float(run([program, W, LEADING], "latency of the feedback channel"))
 

@@ -31,8 +31,8 @@ RATES_MHZ = (24, 30, 36, 40, 44, 46, 47, 47.5)
 
 def relay_run(*words: object) -> dict[str, float]:
     """What the program prints, {name: number}."""
-    told = run([simulation(DRIVER, RELAY, **AS_MEASURED), *words], "relay_run").split()
-    return dict(zip(told[1::2], map(float, told[::2])))
+    printed = run([simulation(DRIVER, RELAY, **AS_MEASURED), *words], "relay_run").split()
+    return dict(zip(printed[1::2], map(float, printed[::2])))
 
 
 def harmonic_arith_arcsec(points: int = POINTS, rings: int = RINGS, seed: int = 1) -> float:

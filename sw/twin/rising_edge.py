@@ -366,7 +366,7 @@ class Sinker:
             return
         first = min(users | writers, default=n)
         if not users or (first not in users and len(effect.changes) == 1):
-            self.block[n] = None  # it is not used, or computed anew before any use
+            self.block[n] = None  # it is not used, or computed again before any use
             return
         others = [self.block[u] for u in users]
         if writers and users | writers != {first}:

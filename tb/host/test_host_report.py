@@ -91,7 +91,7 @@ def test_the_page_contains_everything_and_needs_no_other_file(tmp_path):
         "+12.0",
         "-16.0",
         "0.750",
-        "better",
+        "reached",
         "worse",
         "42",
         "4 MHz",

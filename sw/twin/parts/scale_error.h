@@ -23,7 +23,7 @@ class ScaleError {
         turns_ = 2 * M_PI / p.scale_pitch;
         there_ = linear_ != 0 || cyclic_ != 0 || p.scale_walk != 0;
         RandomSource random(~seed,
-                            stream);  // a stream of its own: what else is random stays as it was
+                            stream);  // its own stream: all other random numbers stay the same
         double sum = 0;
         for (double& error : walk_) error = sum += p.scale_walk * random.normal();
         const double zero = walk_at(0);
