@@ -92,7 +92,7 @@ def test_the_page_contains_everything_and_needs_no_other_file(tmp_path):
         "-16.0",
         "0.750",
         "reached",
-        "worse",
+        "not reached",
         "42",
         "4 MHz",
         "What was done.",

@@ -568,7 +568,7 @@ def cells_of(words: Sequence[int], gap_cells: int = 0) -> list[int]:
 
 
 class FrameBench:
-    """One node without a machine at a low clk (16 clk a bit: the firmware keeps its baud): for 10^5
+    """One node without a machine with a slow clock (16 cycles a bit: the firmware keeps its baud): for 10^5
     damaged frames.
     One made with another clk_hz (whole kHz) is another build.
 
