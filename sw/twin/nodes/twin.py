@@ -568,9 +568,8 @@ def cells_of(words: Sequence[int], gap_cells: int = 0) -> list[int]:
 
 
 class FrameBench:
-    """One node without a machine with a slow clock (16 cycles a bit: the firmware keeps its baud): for 10^5
-    damaged frames.
-    One made with another clk_hz (whole kHz) is another build.
+    """One node without a machine, with a slow clock: 16 cycles a bit, at the baud rate of the
+    firmware. It is for 10^5 damaged frames. One with another clk_hz (whole kHz) is another build.
 
     exchange(levels) puts bit cells on the line as they are and returns the words that the node
     answered."""
@@ -601,7 +600,7 @@ class FrameBench:
         """Returns when `enough` words are there, or the line was quiet for quiet_cells after the
         last level or the answer; at
         the latest after most_cells. A node takes up to 60 cells to answer a request, at a low
-        clk."""
+        clock."""
         sent = array(levels, numpy.uint8)
         count = self.library.frame_bench_exchange(
             self.handle,
