@@ -32,8 +32,11 @@ def ellipse(stage, position=0.0, seconds=0.0):
 def test_a_world_names_all_its_effects_and_a_wrong_one_is_refused():
     typical, bad = tables.world("typical"), tables.world("bad")
     assert set(typical) == set(bad) and len(bad) > 30
-    assert all(abs(typical[name]) <= abs(bad[name]) for name in bad if "piezo_mode" not in name and
-               name not in ("signal_bandwidth", "screw_preload"))
+    assert all(
+        abs(typical[name]) <= abs(bad[name])
+        for name in bad
+        if "piezo_mode" not in name and name not in ("signal_bandwidth", "screw_preload")
+    )
     with pytest.raises(ValueError, match="no world good; there are typical, bad"):
         tables.world("good")
 
@@ -158,7 +161,7 @@ def test_the_floor_shakes_the_table_as_its_spectrum_says():
 
 
 def test_cogging_and_ripple_are_torques_of_the_angle():
-    """A motor without friction rests where its cogging pulls it: half a slot away it is unstable."""
+    """A motor without friction rests where its cogging pulls it."""
     stage = Stage(**SMOOTH, motor_cogging=2e-3, screw_preload=0.0)
     stage.set_position(60e-3)
     start = stage.state.motor_rad_s

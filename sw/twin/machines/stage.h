@@ -35,10 +35,10 @@ class Stage : public Machine {
         return plant.drivetrain.position + piezo.position + velocity() * since(now);
     }
     double velocity() const { return plant.drivetrain.velocity + piezo.velocity; }
-    Motion table(uint64_t now) const {
-        return {position(now), velocity(), double(now) / clk_hz()};
+    Motion table(uint64_t now) const { return {position(now), velocity(), double(now) / clk_hz()}; }
+    uint64_t look(uint64_t now, const Motion& motion) {
+        return interferometer.advance(now, motion);
     }
-    uint64_t look(uint64_t now, const Motion& motion) { return interferometer.advance(now, motion); }
 
  protected:
     unsigned pins() const override {

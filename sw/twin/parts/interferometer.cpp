@@ -61,8 +61,7 @@ void Interferometer::analogue(const Motion& table, double& sine, double& cosine)
         return;
     }
     const double x = table.position;
-    const double turns =
-        (x + scale_error_.at(x, table.time) - p.grating_offset) / p.grating_period;
+    const double turns = (x + scale_error_.at(x, table.time) - p.grating_offset) / p.grating_period;
     const SignalErrors e = drift_.at(x, table.time);
     double phase = 2 * M_PI * (turns - std::floor(turns)), amplitude = e.amplitude;
     if (p.signal_bandwidth > 0) {  // one pole: at a steady velocity a lag and a loss

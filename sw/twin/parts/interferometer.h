@@ -27,9 +27,9 @@
 
 namespace twin {
 
-struct Motion {                      // of the table against the reading head
-    double position, velocity = 0;   // m, m/s
-    double time = 0;                 // s from power-up
+struct Motion {                     // of the table against the reading head
+    double position, velocity = 0;  // m, m/s
+    double time = 0;                // s from power-up
 };
 
 class Interferometer {
