@@ -5,6 +5,7 @@ What drifts does so within the run instead of within ten minutes to half an hour
 """
 
 import random
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,9 @@ def measure_segments(stage: Stage, name: str, segments: int) -> list[float]:
         stage.move(name, border * LENGTH_NM)
         errors.append(reading_nm(stage, name))
     stage.zero_nm[name] -= errors[0]  # the reference begins at the first border
-    table = SegmentTable(0, LENGTH_NM, tuple(error - errors[0] for error in errors))
+    table = SegmentTable(
+        Fraction(0), Fraction(LENGTH_NM), tuple(Fraction(error - errors[0]) for error in errors)
+    )
     Segments(stage.axes[name]).load(table, "linear")
     return errors
 
