@@ -28,6 +28,12 @@ enum calibration_need {
     CALIBRATION_NEEDS_LOADING   // its values in the hardware
 };
 
+enum calibration_mode {      // as the parameter auto_calibration counts them
+    CALIBRATION_FROZEN,      // the values stay
+    CALIBRATION_CALIBRATES,  // determines everything
+    CALIBRATION_FOLLOWS      // adds what the ellipse has changed since to the values
+};
+
 // Sums over samples. x = cos and y = sin in 13 bits, so that the sums of 4096 samples fit.
 struct calibration_ellipse {
     uint16_t count;       // samples, at most 4096
@@ -59,9 +65,13 @@ struct calibration {
     uint16_t scatter_limit;  // largest standard error that is accepted, 2^-20 period
     uint8_t reason;          // a bus_calibration_reason: of the last burst or pass
     uint8_t need;            // a calibration_need
-    bool frozen;
-    bool harmonics;     // the ellipse is known: bursts of phases are next
-    bool complete;      // a pass has been accepted since the last reset
+    uint8_t mode;            // a calibration_mode
+    bool harmonics;          // the ellipse is known: bursts of phases are next, unless it follows
+    bool complete;           // a pass has been accepted since the last reset
+    bool referenced;         // `beside` is known
+    // The values in force less those of an ellipse of the same time: offsets of sine and cosine,
+    // gain, quadrature error. An ellipse takes some of the harmonics for its own.
+    int32_t beside[4];
     uint32_t refused;   // bursts and passes, since start
     uint32_t accepted;  // ellipses and passes, since start
     uint32_t scatter;   // standard error of the last pass, 2^-20 period
