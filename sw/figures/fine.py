@@ -4,6 +4,7 @@
 import random
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,11 @@ def s0_hold_nm_rms(
 
 # ------------------------------------------------------------------ signals that drift
 
-DRIFT = {"drift_offset": 0.02, "drift_gain": 0.02, "drift_phase": 1.0}  # see stage.toml
+DRIFT: dict[str, Any] = {
+    "drift_offset": 0.02,
+    "drift_gain": 0.02,
+    "drift_phase": 1.0,
+}  # see stage.toml
 DRIFT_S = 600.0
 
 
