@@ -4,6 +4,7 @@ check refuses with its reason, values are stored and restored.
 """
 
 import ctypes
+import itertools
 import math
 import random
 
@@ -338,11 +339,23 @@ def test_a_vibration_locked_to_the_fringe_at_one_of_two_speeds_is_subtracted(mul
     )
 
 
-def test_vibrations_locked_to_the_fringe_at_each_speed_are_refused():
-    speeds = iter([600, 700] * 100)
-    machine, *_ = signals.calibrated(3, (600, 700), speeds=lambda: next(speeds))
+@pytest.mark.parametrize("fringes", [610, 5200])
+def test_vibrations_locked_to_the_fringe_at_each_speed_are_refused(fringes):
+    """By a pass of usual length, and by one that was made longer in vain."""
+    speeds = itertools.cycle([600, 700])
+    machine, *_ = signals.calibrated(3, (600, 700), speeds=lambda: next(speeds), fringes=fringes)
     assert machine.calibration.reason == model.VIBRATION
+    assert machine.calibration.refused == (fringes > 610)
     assert not machine.calibration.complete and not any(machine.values["cosine"])
+
+
+def test_a_broadband_vibration_is_averaged_out_by_a_longer_pass():
+    machine, left, _ = signals.broadband(1, 4800)
+    assert machine.calibration.accepted == 2 and machine.calibration.complete
+    assert machine.calibration.refused == 0 and left <= 0.3
+    early, left, _ = signals.broadband(1, 2000)
+    assert early.calibration.reason == model.VIBRATION and not early.calibration.complete
+    assert early.calibration.pass_.bursts > model.PASS and left > 3
 
 
 def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():

@@ -17,11 +17,13 @@
 #include "calibration/waves.h"
 #include "made/bus_protocol.h"
 
-#define SCATTER_LIMIT 64   // 4 LSB of a 16-bit phase
-#define FEWEST_SPECTRA 3u  // that show which line stays
+#define SCATTER_LIMIT 64      // 4 LSB of a 16-bit phase
+#define LIMITS_OF_LONGEST 3u  // of them are accepted from a pass that cannot become longer
+#define FEWEST_SPECTRA 3u     // that show which line stays
 
 enum stage {
     UPDATE,
+    LAST_UPDATE,
     TABLE,
     FIRST_READING,
     FIT,
@@ -280,18 +282,21 @@ static void end_of_projection(struct calibration* calibration) {
         calibration->reason = BUS_CALIBRATION_REASON_CALIBRATING;
     if (pass->bursts == 0 || gone < pass->slowest) pass->slowest = gone;
     if (pass->bursts == 0 || gone > pass->fastest) pass->fastest = gone;
-    begin_stage(UPDATE);
-    if (++pass->bursts < CALIBRATION_PASS) end_burst(calibration, CALIBRATION_NEEDS_PHASES);
+    if (++pass->bursts % CALIBRATION_PASS)
+        end_burst(calibration, CALIBRATION_NEEDS_PHASES);
+    else
+        begin_stage(LAST_UPDATE);
 }
 
 static void end_of_pass(struct calibration* calibration) {
     const struct calibration_pass* pass = &calibration->pass;
     enum bus_calibration_reason reason = BUS_CALIBRATION_REASON_CALIBRATING;
-    bool even;
+    bool even, longest = pass->bursts >= CALIBRATION_LONGEST_PASS;
+    uint32_t limit = (longest ? LIMITS_OF_LONGEST : 1u) * calibration->scatter_limit;
     calibration->scatter = harmonics_scatter(pass, &even);
     if ((uint64_t)pass->fastest * 8 < (uint64_t)pass->slowest * 9)
         reason = BUS_CALIBRATION_REASON_ONE_SPEED;
-    else if (!even || calibration->scatter > calibration->scatter_limit)
+    else if (!even || calibration->scatter > limit)
         reason = BUS_CALIBRATION_REASON_VIBRATION;
     else if (!calibration_values_fit(&burst.candidate))
         reason = BUS_CALIBRATION_REASON_DISTORTED;
@@ -299,6 +304,10 @@ static void end_of_pass(struct calibration* calibration) {
         calibration->values = burst.candidate;
         calibration->complete = true;
         accept(calibration);
+    } else if (reason == BUS_CALIBRATION_REASON_VIBRATION && !longest) {
+        // Further bursts average the vibration out.
+        calibration->reason = (uint8_t)reason;
+        end_burst(calibration, CALIBRATION_NEEDS_PHASES);
     } else {
         reject(calibration, reason);
         release_burst(calibration);
@@ -315,7 +324,9 @@ void calibration_work(struct calibration* calibration) {
     case UPDATE:
         if (!harmonics_update_candidate(pass, next)) break;
         begin_stage(TABLE);
-        if (pass->bursts == CALIBRATION_PASS) end_of_pass(calibration);
+        break;
+    case LAST_UPDATE:
+        if (harmonics_update_candidate(pass, next)) end_of_pass(calibration);
         break;
     case TABLE:
         if (harmonics_fill_table(next)) begin_burst(calibration);

@@ -14,9 +14,10 @@
 #define CALIBRATION_WORDS 4u      // words of phases that are taken at once
 #define CALIBRATION_PHASES 2048u  // phases in a burst
 #define CALIBRATION_ELLIPSE_BURSTS 2u
-#define CALIBRATION_PASS 39u     // bursts of phases in a pass
-#define CALIBRATION_LINES 128u   // of the spectrum of a burst: 0 … 127 cycles in it
-#define CALIBRATION_PERIODS 15u  // that a burst should cover; it must cover 8
+#define CALIBRATION_PASS 39u           // bursts of phases in a pass
+#define CALIBRATION_LONGEST_PASS 312u  // of one that a vibration makes longer
+#define CALIBRATION_LINES 128u         // of the spectrum of a burst: 0 … 127 cycles in it
+#define CALIBRATION_PERIODS 15u        // that a burst should cover; it must cover 8
 
 enum calibration_need {
     CALIBRATION_NEEDS_NOTHING,  // it is frozen
@@ -49,12 +50,12 @@ struct calibration_ellipse {
 struct calibration_pass {
     uint32_t slowest, fastest;  // |travel| of a burst, 2^-16 period
     uint16_t every;             // decimation of the recorder for which `line` holds
-    uint8_t bursts;
+    uint16_t bursts;
     uint8_t spectra;                          // that `line` covers
     uint8_t line[CALIBRATION_LINES];          // weakest power of the line in any burst, 4 log2
     int32_t information[CALIBRATION_ORDERS];  // weight of the bursts for an order, 2^-15 burst
-    int32_t cosine[CALIBRATION_ORDERS];  // weighted sum of the results of the bursts, 2^-27 period
-    int32_t sine[CALIBRATION_ORDERS];
+    int64_t cosine[CALIBRATION_ORDERS];  // weighted sum of the results of the bursts, 2^-27 period
+    int64_t sine[CALIBRATION_ORDERS];
     int64_t squares;  // of the weighted changes that the bursts made, all orders, 2^-48 period^2
 };
 

@@ -77,12 +77,12 @@ class Pass(ctypes.Structure):
         ("slowest", c_uint32),
         ("fastest", c_uint32),
         ("every", c_uint16),
-        ("bursts", c_uint8),
+        ("bursts", c_uint16),
         ("spectra", c_uint8),
         ("line", c_uint8 * LINES),
         ("information", c_int32 * ORDERS),
-        ("cosine", c_int32 * ORDERS),
-        ("sine", c_int32 * ORDERS),
+        ("cosine", c_int64 * ORDERS),
+        ("sine", c_int64 * ORDERS),
         ("squares", c_int64),
     ]
 
