@@ -151,13 +151,16 @@ def random_moves(
     seed: int,
     progress: Callable[[Statuses], object] | None = None,
     done: Callable[[report.Move], object] | None = None,
+    high_nm: float = 20e6,
 ) -> list[report.Move]:
-    """Makes `count` moves of the axes in turn; the seed determines the targets."""
+    """Makes `count` moves of the axes in turn, from 0 to `high_nm`; the seed determines the
+    targets.
+    """
     source, here = random.Random(seed), {name: 0.0 for name in stage.axes}
     moves: list[report.Move] = []
     for number in range(count):
         name = list(stage.axes)[number % len(stage.axes)]
-        here[name] = random_target(here[name], source)
+        here[name] = random_target(here[name], source, high_nm=high_nm)
         moves.append(stage.move(name, here[name], progress))
         if done is not None:
             done(moves[-1])

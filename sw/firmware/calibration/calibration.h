@@ -22,15 +22,15 @@
 void calibration_start(struct calibration* calibration);  // from reset: nothing is known
 
 // The values become calibration_identity and everything is determined from scratch; window, limit,
-// counters and the freeze stay.
+// counters and the mode stay.
 void calibration_forget(struct calibration* calibration);
 
 // Puts values into force as if they had been determined. Returns false and changes nothing if one
 // is out of range.
 bool calibration_restore(struct calibration* calibration, const struct calibration_values* values);
 
-// A frozen calibration determines nothing; its values stay in force.
-void calibration_freeze(struct calibration* calibration, bool frozen);
+// A frozen calibration determines nothing; its values stay in force. What was under way ends.
+void calibration_set_mode(struct calibration* calibration, enum calibration_mode mode);
 
 // A burst was recorded, one sample of `every`; it is spoiled if its amplitude left the window.
 // Returns false if no burst is needed, or another calibration works on one: then call again.

@@ -32,7 +32,7 @@ static uint8_t calibration(unsigned axis) {
         calibration_driver_do(axis, (uint8_t)bus_request_field(BUS_CALIBRATION_REQUEST_ACTION, 1));
     bus_reply_field(BUS_CALIBRATION_REPLY_REASON, calibration_driver_reason(axis), 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_CONVERGED, calibration->complete, 1);
-    bus_reply_field(BUS_CALIBRATION_REPLY_FROZEN, calibration->frozen, 1);
+    bus_reply_field(BUS_CALIBRATION_REPLY_FROZEN, calibration->mode == CALIBRATION_FROZEN, 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_ACCEPTED, calibration->accepted, 4);
     bus_reply_field(BUS_CALIBRATION_REPLY_REFUSED, calibration->refused, 4);
     bus_reply_field(BUS_CALIBRATION_REPLY_SCATTER, calibration->scatter, 4);

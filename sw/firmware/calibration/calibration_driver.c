@@ -3,9 +3,9 @@
 // calibration_recorder, values go into signal_correction and harmonic_correction.
 //
 // A burst is begun while the axis moves fast enough to cover CALIBRATION_PERIODS within LONGEST_MS,
-// and begun again when the speed has changed by a factor of two since. It is read a few words a
-// poll, and worked on a few pieces a poll, for at most about WORK_MS. New values are written beside
-// those in force, and one strobe exchanges both the correction and the table.
+// and begun again at twice the speed; one of phases also at half the speed. It is read
+// a few words a poll, and worked on a few pieces a poll, for at most about WORK_MS. New values are
+// written beside those in force, and one strobe exchanges both the correction and the table.
 #include "calibration/calibration_driver.h"
 
 #include "axis/axis.h"
@@ -56,6 +56,13 @@ static bool near(uint32_t every, uint32_t required) {
     return 3u * every >= 2u * required && every <= 2u * required;
 }
 
+// It is better to begin a burst again at the present speed: at twice the speed it ends sooner, and
+// phases must be from one speed. Samples may be from any.
+static bool outdated(const struct calibration_driver* driver, uint32_t every) {
+    return every == 0 || 2u * every < driver->every ||
+           (driver->phases && every > 2u * driver->every);
+}
+
 static void record(unsigned n) {
     struct calibration_driver* driver = &drivers[n];
     const struct calibration_pass* pass = &driver->calibration.pass;
@@ -88,7 +95,7 @@ static void burst_poll(unsigned n) {
     if (state & FEEDBACK_RECORDER_STATE_FULL_MASK)
         driver->recording = !calibration_open(&driver->calibration, driver->every,
                                               state & FEEDBACK_RECORDER_STATE_INVALID_MASK);
-    else if (every == 0 || every > 2u * driver->every || 2u * every < driver->every)
+    else if (outdated(driver, every))
         record(n);
 }
 
@@ -152,9 +159,9 @@ void calibration_driver_start(unsigned n) {
 
 static void follow_parameter(unsigned n) {
     struct calibration_driver* driver = &drivers[n];
-    bool frozen = parameters_get(n, BUS_PARAMETER_AUTO_CALIBRATION) == 0;
-    if (driver->calibration.frozen == frozen) return;
-    calibration_freeze(&driver->calibration, frozen);
+    uint8_t mode = (uint8_t)parameters_get(n, BUS_PARAMETER_AUTO_CALIBRATION);
+    if (driver->calibration.mode == mode) return;
+    calibration_set_mode(&driver->calibration, mode);
     driver->recording = false;
     driver->moving = true;  // until the speed is read
 }
@@ -184,18 +191,26 @@ uint8_t calibration_driver_reason(unsigned n) {
     return driver->calibration.reason;
 }
 
+static void set_mode(unsigned n, enum calibration_mode mode) {
+    parameters_set(n, BUS_PARAMETER_AUTO_CALIBRATION, mode);
+    follow_parameter(n);
+}
+
 uint8_t calibration_driver_do(unsigned n, uint8_t action) {
     struct calibration_driver* driver = &drivers[n];
-    if (action > BUS_CALIBRATION_ACTION_CLEAR) return BUS_CAUSE_OUT_OF_RANGE;
-    if (action == BUS_CALIBRATION_ACTION_CALIBRATE || action == BUS_CALIBRATION_ACTION_FREEZE)
-        parameters_set(n, BUS_PARAMETER_AUTO_CALIBRATION,
-                       action == BUS_CALIBRATION_ACTION_CALIBRATE);
-    follow_parameter(n);
-    if (action == BUS_CALIBRATION_ACTION_CLEAR) {
+    uint8_t cause = BUS_CAUSE_OK;
+    switch (action) {
+    case BUS_CALIBRATION_ACTION_READ: break;
+    case BUS_CALIBRATION_ACTION_CALIBRATE: set_mode(n, CALIBRATION_CALIBRATES); break;
+    case BUS_CALIBRATION_ACTION_FREEZE: set_mode(n, CALIBRATION_FROZEN); break;
+    case BUS_CALIBRATION_ACTION_FOLLOW: set_mode(n, CALIBRATION_FOLLOWS); break;
+    case BUS_CALIBRATION_ACTION_CLEAR:
         calibration_forget(&driver->calibration);
         restart(driver);
+        break;
+    default: cause = BUS_CAUSE_OUT_OF_RANGE;
     }
-    return BUS_CAUSE_OK;
+    return cause;
 }
 
 uint8_t calibration_driver_set_harmonic(unsigned n, uint8_t order, int32_t cosine, int32_t sine) {

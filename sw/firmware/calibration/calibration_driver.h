@@ -2,8 +2,8 @@
 // calibration_driver -- connects the calibration of each axis to its registers: bursts come from
 // calibration_recorder, values go into signal_correction and harmonic_correction.
 //
-// The parameter `auto_calibration` says whether an axis calibrates itself; when it does not, the
-// values that were determined stay in force.
+// The parameter `auto_calibration` says whether an axis calibrates itself or follows the drift of
+// its signal; when it does neither, the values that were determined stay in force.
 #ifndef MOIRE_CALIBRATION_DRIVER_H
 #define MOIRE_CALIBRATION_DRIVER_H
 

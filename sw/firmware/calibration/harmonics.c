@@ -54,7 +54,7 @@ static int32_t entry_of(int64_t sum) { return clamp((sum + (1 << 18)) >> 19, LAR
 int32_t harmonics_table_entry(const struct calibration_values* values, uint32_t point) {
     int64_t sum[4];
     sums_at(values, point * (512 / CALIBRATION_POINTS), sum);
-    return entry_of(sum[0] + sum[1] + sum[2] + sum[3]);
+    return entry_of(sum[0] + sum[1] + sum[2] + sum[3] + (int64_t)values->shift * (1 << 15));
 }
 
 // Fills four bins, which mirror each other.

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x6002DF55u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xFD44F463u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -186,6 +186,8 @@ enum bus_calibration_action {
     BUS_CALIBRATION_ACTION_FREEZE = 2,    // stop the calibration; the correction stays in force
     // remove the correction: nothing is corrected any more, and a calibration starts again
     BUS_CALIBRATION_ACTION_CLEAR = 3,
+    // follow the drift of offsets, gain and quadrature error from now on
+    BUS_CALIBRATION_ACTION_FOLLOW = 4,
 };
 
 enum bus_scope_trigger {
@@ -876,7 +878,8 @@ enum bus_parameter {
     // [0.001 s] interlock: longest silence of the bus while a drive is on (all axes); 0: no limit,
     // for a machine that runs without a host
     BUS_PARAMETER_WATCHDOG_TIME = 32,
-    // correction of sine and cosine: 0 frozen, 1 calibrates while the axis moves
+    // correction of sine and cosine: 0 frozen, 1 calibrates while the axis moves, 2 follows the
+    // drift of offsets, gain and quadrature error
     BUS_PARAMETER_AUTO_CALIBRATION = 33,
     // decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulse and direction; other than 0
     // needs disagreement_limit 0
@@ -1012,7 +1015,7 @@ enum bus_parameter {
     X(encoder_fault_mask, 30, 0LL, 63LL, 30LL) \
     X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
     X(watchdog_time, 32, 0LL, 65535LL, 500LL) \
-    X(auto_calibration, 33, 0LL, 1LL, 0LL) \
+    X(auto_calibration, 33, 0LL, 2LL, 0LL) \
     X(decoder_mode, 34, 0LL, 3LL, 0LL) \
     X(filter_skip, 35, 0LL, 1000000LL, 0LL) \
     X(filter_tolerated, 36, 0LL, 15LL, 0LL) \
