@@ -32,7 +32,7 @@ async def converted(dut):
     await FallingEdge(dut.clk)
     dut.sample_tick.value = 0
     for _ in range(100):
-        if int(dut.g_sine.converted.value):
+        if int(dut.u_sine.g_built.converted.value):
             return
         await FallingEdge(dut.clk)
     raise AssertionError("no word came from the ADC")
