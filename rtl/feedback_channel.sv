@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// feedback_channel -- the measuring path of an axis: from the pins of a scale to its position.
+// feedback_channel -- measure the position of an axis: from the pins of its scale to position,
+// captures and compare pulses.
 //
 // latency  22 cycles from an ADC word to position with a chain of its own, 23 with a shared one and
 //          1 more for each axis that is served before, 30 at most for eight axes; 5 cycles from the
@@ -10,7 +11,7 @@
 //          HAS_OWN_CHAIN and HAS_CAPTURE. The check of the encoder consists of the check of counts
 //          per revolution, the count at the last index and the time of the last edge.
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
-// model    the models of its blocks; proved in motion by tb/system
+// model    the models of its blocks; tested together by tb/system
 `default_nettype none
 
 module feedback_channel #(

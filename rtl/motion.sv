@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// motion -- the motion of all axes of a node: passes their settings and requests to the motion
-// engine, and draws lines of motor steps from its targets.
+// motion -- move all axes of a node: pass their settings and requests to the motion engine, and
+// draw lines of motor steps from its targets.
 //
 // latency  see engine_bus, motion_engine and step_lines
 // rate     see engine_bus, motion_engine and step_lines

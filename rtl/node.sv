@@ -11,7 +11,7 @@
 //            build, with the rule as the message, and so do more axes and filters than
 //            motion_engine can serve in the cycles of a servo tick, CLK_HZ / TICK_HZ.
 // source   S0: one slave computer per axis, many on one bus; here one node may have several axes
-// model    the models of its blocks; proved in motion by tb/system
+// model    the models of its blocks; tested together by tb/system
 `default_nettype none
 
 module node #(

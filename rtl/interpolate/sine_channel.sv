@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// sine_channel -- the sine and cosine path of a feedback channel: from the pins of its ADCs to steps
-// of the position, with signal monitor and recorder.
+// sine_channel -- turn sine and cosine of a scale into steps of its position: ADCs, interpolation,
+// signal monitor and recorder of a feedback channel.
 //
-// latency  see interpolation_chain for the time from an ADC word to tracked; tracked follows a shared
-//          chain in the same cycle
+// latency  see interpolation_chain for the time from an ADC word to tracked; tracked follows a
+//          shared chain in the same cycle
 // rate     one sample per conversion
 // behaviour  A feature that is not built has no logic, and what it would report is 0. Without
 //          HAS_OWN_CHAIN an interpolation_chain of the node computes the steps of several axes; the
 //          ports chain_... and sample_... connect it. With a chain of its own these outputs are 0.
 // source   S0: interferometer with sine, cosine and comparator outputs
-// model    the models of its blocks; proved in motion by tb/interpolate/test_feedback_channel.py
+// model    the models of its blocks; tested together by tb/interpolate/test_feedback_channel.py
 `default_nettype none
 
 module sine_channel #(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// position_events -- captures of the position at events, and compare pulses at positions.
+// position_events -- capture the position at events, and send compare pulses at positions.
 //
 // latency  see position_capture, index_capture and position_compare
 // rate     see position_capture, index_capture and position_compare
@@ -7,7 +7,7 @@
 //          HAS_CAPTURE only the index captures, one at a time, with its position alone: that is
 //          what homing needs.
 // source   S0: position at the index; any scale that triggers a camera or a laser
-// model    the models of its blocks; proved in motion by tb/system/test_feedback_counts.py
+// model    the models of its blocks; tested together by tb/system/test_feedback_counts.py
 `default_nettype none
 
 module position_events #(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// scale_position -- the position of a scale: from steps of its sine and cosine, or from counts of its
-// edges, to a position that is corrected by a segment table.
+// scale_position -- compute the position of a scale from steps of its sine and cosine or from
+// counts of its edges, and correct it by a segment table.
 //
 // latency  see unwrap, count_to_phase and segment_correction
 // rate     one step per cycle
@@ -8,7 +8,7 @@
 //          less its segment error; without a table the two are equal, moved repeats shift, and the
 //          state of the table is 0.
 // source   S0: interferometer, segment table; any A/B/Z scale
-// model    the models of its blocks; proved in motion by tb/system/test_feedback_counts.py
+// model    the models of its blocks; tested together by tb/system/test_feedback_counts.py
 `default_nettype none
 
 module scale_position #(
