@@ -79,7 +79,7 @@ module step_lines #(
         DIVIDE,
         GIVE
     } state;
-    logic [A-1:0] seen;  // axis that is looked at
+    logic [A-1:0] seen;  // number of the axis whose turn it is
     logic [5:0] bits_left;  // of the quotient, less one
     logic signed [47:0] distance;  // 2^-16 step
     logic [P-1:0] remainder;

@@ -294,7 +294,7 @@ async def a_setting_whose_need_was_not_built_reads_zero_whatever_is_written(dut)
 def bench(name):
     """Write the top that joins a block with the register memory, as the soft core reads them."""
     block = next(b for b in tables.read() if b.name == name)
-    ports = [(kind, shape, port) for kind, shape, port, _ in block.ports]
+    ports = [(kind, shape, port) for kind, shape, port, _, _ in block.ports]
     low = [".wdata_low"] if block.wide_settings else []
     passed = ", ".join(f".{p}({p})" for p in block.parameters)
     kept = ", ".join(f".{p}({p})" for p in needs_of(block))
