@@ -157,7 +157,7 @@ async def random_words_match_the_model(dut):
             rst=int(random.random() < 0.005),
             stores=stores,
             address=address,
-            value=layout.kept(address, value),
+            value=layout.stored_bits(address, value),
             value_low=random.getrandbits(32),
             setting_waits=int(left > 0),
             moved=random.getrandbits(bus.axes) if random.random() < 0.1 else 0,
