@@ -5,7 +5,7 @@
 // latency  see the blocks
 // rate     one character each way at a time, 128 in each queue
 // source   S0: one master, many slaves on one pair of wires, the 9th bit marks command bytes
-// model    the models of its blocks; proved in motion by tb/serial/test_rs485_port.py
+// model    the models of its blocks; tested together by tb/serial/test_rs485_port.py
 `default_nettype none
 
 module rs485_port #(

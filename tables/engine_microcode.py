@@ -1202,8 +1202,8 @@ def memory_text() -> str:
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
-// engine_memory -- the words of all axes of motion_engine: state, settings, queues, filters and
-// constants.
+// engine_memory -- store the words of all axes of motion_engine: state, settings, queues, filters
+// and constants.
 //
 // latency   1 cycle from read_at to stored, and from write to the new word
 // rate      one word read and one written per cycle, which must not be the same
@@ -1305,7 +1305,8 @@ def regions_text() -> str:
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
-// engine_regions -- what the lines of engine_microcode belong to, for a proof.
+// engine_regions -- report which part of the microcode a line belongs to, for the proof of
+// engine_sequencer.
 //
 // latency   0 cycles, combinational
 // rate      one line per cycle

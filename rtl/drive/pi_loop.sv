@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// pi_loop -- PI controller in serial arithmetic: 2^16 command = kp e + integral, where e = target -
-// position, and integral += ki e.
+// pi_loop -- compute a PI controller in serial arithmetic: 2^16 command = kp e + integral, where e
+// = target - position, and integral += ki e.
 //
 // latency   53 cycles from tick to valid
 // rate      one command per tick, a tick at least 53 cycles after the one before. An earlier tick

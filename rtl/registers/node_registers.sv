@@ -6,7 +6,7 @@
 // behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
-// made     by tables/registers.py, never by hand
+// made     by tables/registers.py, not to be edited
 `default_nettype none
 
 module node_registers (
@@ -21,11 +21,17 @@ module node_registers (
     input  wire  [ 3:0] build_axes,         // what is built: axes
     input  wire  [ 3:0] build_address,      // what is built: address
     input  wire  [ 7:0] build_memory,       // what is built: memory [1024 byte]
-    input  wire  [63:0] time_stamp,         // cycles since reset, cycle
-    output logic [23:0] tick_period,        // period of the servo tick, cycle
-    output logic [15:0] sample_period,      // period of the samples, cycle
-    output logic        heartbeat_kick,     // strobe: heartbeat of the firmware
-    output logic [ 7:0] start_axes,         // axes that start
+    // cycles since reset; every time stamp is a part of it [cycle]
+    input  wire  [63:0] time_stamp,
+    // period of the servo tick; it is the same for all axes [cycle]
+    output logic [23:0] tick_period,
+    // period of the samples; it is the same for all ADCs [cycle]
+    output logic [15:0] sample_period,
+    // strobe: heartbeat of the firmware; while a drive is on, the longest time between two is 20 ms
+    // and 1 200 000 cycles: kick
+    output logic        heartbeat_kick,
+    // axes that start, bit n: axis n; they play their queued segments from the same tick on
+    output logic [ 7:0] start_axes,
     output logic        start_axes_written  // strobe: new value
 );
     logic [31:0] time_stamp_high;

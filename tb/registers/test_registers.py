@@ -294,10 +294,10 @@ async def a_setting_whose_need_was_not_built_reads_zero_whatever_is_written(dut)
 def bench(name):
     """Write the top that joins a block with the register memory, as the soft core reads them."""
     block = next(b for b in tables.read() if b.name == name)
-    ports = [(kind, shape, port) for kind, shape, port, _ in block.ports]
+    ports = [(kind, shape, port) for kind, shape, port, _, _ in block.ports]
     low = [".wdata_low"] if block.wide_settings else []
     passed = ", ".join(f".{p}({p})" for p in block.parameters)
-    kept = ", ".join(f".{p}({p})" for p in needs_of(block))
+    masks = ", ".join(f".{p}({p})" for p in needs_of(block))
     parameters = ", ".join(f"parameter int {p} = 1" for p in needs_of(block))
     lines = [
         f"module {name}_bench {f'#({parameters})' if parameters else ''}",
@@ -307,7 +307,7 @@ def bench(name):
         ",\n".join(" ".join(port) for port in ports),
         "); wire [31:0] live, settings, wdata_low, stored_value; wire [13:0] stored_at;",
         "wire stores; logic got;",
-        f"register_memory #({kept}) u_memory (.clk, .rst, .hold(1'b0), .select, .write,",
+        f"register_memory #({masks}) u_memory (.clk, .rst, .hold(1'b0), .select, .write,",
         f".address({{8'd{block.base // 256}, word}}), .wdata, .ready, .rdata(settings),",
         ".wdata_low, .stores, .stored_at, .stored_value);",
         f"{name}_registers #({passed}) u_block (",

@@ -2,7 +2,7 @@
 // calibration -- offset, gain, quadrature error and harmonics of a sine/cosine signal, determined
 // in motion and without a reference (docs/interpolation.md). No hardware.
 //
-// Whoever serves it looks at `need` and does this, a few words or one piece of work a poll:
+// The caller polls `need` and does this, a few words or one piece of work a poll:
 //   CALIBRATION_NEEDS_SAMPLES, _PHASES  let calibration_recorder fill, then call calibration_open
 //   CALIBRATION_NEEDS_WORDS             calibration_take for each sample of the burst, or for each
 //                                       four words of phases; a burst of phases is read twice
@@ -22,7 +22,7 @@
 void calibration_start(struct calibration* calibration);  // from reset: nothing is known
 
 // The values become calibration_identity and everything is determined from scratch; window, limit,
-// counters and the mode stay.
+// counters and the mode do not change.
 void calibration_forget(struct calibration* calibration);
 
 // Puts values into force as if they had been determined. Returns false and changes nothing if one

@@ -33,7 +33,7 @@ struct calibration_driver {
 static struct calibration_driver drivers[HARDWARE_AXES];
 static uint32_t work_cycles;
 
-// Ends whatever was under way for the calibration.
+// Ends the burst or the loading that was under way for the calibration.
 static void restart(struct calibration_driver* driver) {
     driver->recording = false;
     driver->point = 0;

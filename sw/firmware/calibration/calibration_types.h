@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // calibration_types -- the state of the calibration of one sine/cosine signal: what is in force,
-// what it needs next, and the sums of what it has seen.
+// what it needs next, and the sums of its samples and phases.
 #ifndef MOIRE_CALIBRATION_TYPES_H
 #define MOIRE_CALIBRATION_TYPES_H
 
