@@ -3,9 +3,9 @@
 //
 // latency   0 wait cycles for a write to memory, 1 wait cycle for a word read from memory; 0 wait
 //           cycles for an instruction that the memory has read ahead, 1 wait cycle for any other
-//           one; 2 wait cycles for an access to a register, and as many more as ready is low.
+//           one; 3 wait cycles for an access to a register, and as many more as ready is low.
 // rate      An operation takes 3 cycles, a write to memory 5, a word read from memory or a product
-//           6, a register access 7, a quotient 38.
+//           6, a register access 8, a quotient 38.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
 //           8000_0000 (64 KiB, whole words only). Any other access, a misaligned access and an
 //           illegal instruction stop the core: trap is high until rst, which starts the core at
@@ -16,9 +16,9 @@
 // model     tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
 // proved    Whatever the core does: an access to no valid address raises trap in the next cycle,
 //           and trap stays high until rst. select is a strobe, only for an access to a whole word
-//           of the registers, only while ready is high, never for an instruction, and never in
-//           two cycles that follow each other. Each word that the core takes from the memory was
-//           read at the address of the access, after the last write to that address.
+//           of the registers, only one cycle after ready was high, never for an instruction, and
+//           never in two cycles that follow each other. Each word that the core takes from the
+//           memory was read at the address of the access, after the last write to that address.
 // proof     depth 6, MEMORY_BYTES = 1024
 `default_nettype none
 
@@ -28,7 +28,7 @@ module soft_core #(
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire         ready,    // level: the registers take an access
+    input  wire         ready,    // level: the registers take an access in the next cycle
     output logic        select,   // strobe: one access to the registers
     output logic        write,    // level: with select, wdata is to be written
     output logic [15:0] address,  // byte address of a register
@@ -67,13 +67,13 @@ module soft_core #(
     wire memory_ready = has_core || has_ahead || storing;
     wire mem_ready = answered || memory_ready;
 
-    assign select  = mem_valid && in_registers && ready && !awaited && !answered;
     assign write   = mem_wstrb[0];
     assign address = mem_addr[15:0];
     assign wdata   = mem_wdata;
     assign trap    = core_trap || lost;
 
     always_ff @(posedge clk) begin
+        select    <= mem_valid && in_registers && ready && !(select || awaited || answered);
         awaited   <= select;
         answered  <= awaited;
         word      <= memory_rdata;
@@ -85,6 +85,7 @@ module soft_core #(
         has_ahead <= ahead && mem_la_read && la_in_memory && mem_la_addr[A-1:2] == following;
         if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
         if (rst) begin
+            select    <= 1'b0;
             awaited   <= 1'b0;
             answered  <= 1'b0;
             lost      <= 1'b0;
@@ -188,7 +189,7 @@ module soft_core #(
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);
             assert (!(select && $past(select)));
-            if (select) assert (mem_valid && !in_memory && !mem_instr && ready);
+            if (select) assert (mem_valid && !in_memory && !mem_instr && $past(ready));
             if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
             if (write && select) assert (mem_wstrb == '1);
             if (storing) assert (mem_valid && in_memory);
