@@ -100,7 +100,7 @@ async def the_line_closes_over_the_period_and_the_phase_wraps(dut):
 async def nothing_is_corrected_before_the_first_swap_or_by_a_partially_written_table(dut):
     model = await begin(dut)
     for entry in enumerate([1600] * POINTS):
-        assert await cycle(dut, model, 1, 777, write=entry) in ((0, 0), (1, 777))
+        assert await cycle(dut, model, 1, 777, write=entry) in ((0, 0), (0, 777), (1, 777))
         await cycle(dut, model)
     assert await ask(dut, model, 777, swap=1) == 677
     for entry in enumerate([3200] * POINTS):
