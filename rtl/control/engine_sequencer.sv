@@ -52,14 +52,14 @@ module engine_sequencer #(
 
     // The conditions of both lines that may be fetched are tested at once. The adder knows latest
     // whether its sum is negative, so that comes last.
-    wire [5:0] next_condition = next_code[24:19];
-    wire [5:0] target_condition = target_code[24:19];
-    wire next_jump = next_code[25] ? !all[next_condition] : all[next_condition];
-    wire target_jump = target_code[25] ? !all[target_condition] : all[target_condition];
-    wire next_tests_sign = next_condition == NEGATIVE;
-    wire target_tests_sign = target_condition == NEGATIVE;
-    wire tests_sign = jumped ? target_tests_sign : next_tests_sign;
-    wire jump = (jumped ? target_jump : next_jump) ^ (tests_sign && conditions[NEGATIVE]);
+    wire  [ 5:0] next_condition = next_code[24:19];
+    wire  [ 5:0] target_condition = target_code[24:19];
+    wire         next_jump = next_code[25] ? !all[next_condition] : all[next_condition];
+    wire         target_jump = target_code[25] ? !all[target_condition] : all[target_condition];
+    wire         next_tests_sign = next_condition == NEGATIVE;
+    wire         target_tests_sign = target_condition == NEGATIVE;
+    wire         tests_sign = jumped ? target_tests_sign : next_tests_sign;
+    wire         jump = (jumped ? target_jump : next_jump) ^ (tests_sign && conditions[NEGATIVE]);
 
     always_comb begin
         all = conditions;

@@ -3,7 +3,8 @@
 //
 // latency   0 wait cycles for a write to memory, 1 wait cycle for a word read from memory; 0 wait
 //           cycles for an instruction that the memory has read ahead, 1 wait cycle for the second
-//           half of one that was not, 2 for any other one; 3 wait cycles for an access to a register, and as many more as ready is low.
+//           half of one that it has not, 2 for any other one; 3 wait cycles for an access to a
+//           register, and as many more as ready is low.
 // rate      An operation takes 3 cycles, a write to memory 5, a word read from memory or a product
 //           6, a register access 8, a quotient 38.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
@@ -198,12 +199,12 @@ module soft_core #(
     wire  overwritten = storing && mem_addr[A-1:2] == read_number;
     logic past = 1'b0;
     always @(posedge clk) begin
-        past        <= 1'b1;
+        past <= 1'b1;
         if (arrives || fresh) begin
             word_number <= read_number;
             word_old    <= read_old || overwritten;
         end else if (storing && mem_addr[A-1:2] == word_number) word_old <= 1'b1;
-        read_old    <= storing && (read_old || overwritten);
+        read_old <= storing && (read_old || overwritten);
         if (!storing) read_number <= read_address;
         if (!past) assume (rst);
         // the core begins no access before the last one is done

@@ -43,10 +43,10 @@ module harmonic_correction #(
 
     // nothing that is read while an entry is stored is used, so the memory need not care what that
     // would be
-    (* no_rw_check *)logic signed [17:0] tables[0:(1<<B)-1];
-    logic         waits;  // an entry waits to be stored
-    logic [B-1:0] entry;  // its address
-    logic signed [17:0] entry_value;
+    (* no_rw_check *)logic signed [ 17:0] tables                                [0:(1<<B)-1];
+    logic                waits;  // an entry waits to be stored
+    logic        [B-1:0] entry;  // its address
+    logic signed [ 17:0] entry_value;
     logic [AXES-1:0] page, swapped;  // the table in use; swapped: there is one
     logic signed [17:0] even, odd, even_q, odd_q;
     logic [8:0] odd_weight, odd_weight_q, even_weight_q;  // 2^-8
@@ -54,15 +54,15 @@ module harmonic_correction #(
     logic [15:0] phase_q, phase_qq, phase_qqq;
     logic acts_q, acts_qq, acts_qqq, read, weighed, multiplied;
 
-    wire               swap_here = swap && axis == table_axis;
-    wire               in_force = page[axis] ^ swap_here;
-    wire               spare = !(page[table_axis] ^ swap);  // the table that can be written
-    wire        [ 6:0] even_point = phase[15:9] + 7'(phase[8]);
-    wire signed [26:0] sum = even_part + odd_part + 27'sd2048;
-    wire signed [14:0] change = 15'(sum >>> 12);  // rounded to 2^-16 period
+    wire                swap_here = swap && axis == table_axis;
+    wire                in_force = page[axis] ^ swap_here;
+    wire                spare = !(page[table_axis] ^ swap);  // the table that can be written
+    wire        [  6:0] even_point = phase[15:9] + 7'(phase[8]);
+    wire signed [ 26:0] sum = even_part + odd_part + 27'sd2048;
+    wire signed [ 14:0] change = 15'(sum >>> 12);  // rounded to 2^-16 period
 
-    wire               store = waits && !valid;
-    wire [B-1:0] even_at = store ? entry : B'({axis, in_force, even_point, 1'b0});
+    wire                store = waits && !valid;
+    wire        [B-1:0] even_at = store ? entry : B'({axis, in_force, even_point, 1'b0});
 
     always_ff @(posedge clk) begin
         if (store) tables[even_at] <= entry_value;
