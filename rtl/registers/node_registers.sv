@@ -11,22 +11,24 @@
 
 module node_registers (
     input  wire         clk,
-    input  wire         rst,                // settings take their first values
-    input  wire         select,             // strobe: access to this block
-    input  wire         write,              // level: it writes wdata
-    input  wire  [ 5:0] word,               // index of the word
-    input  wire  [31:0] wdata,              // value to write
-    output logic [31:0] rdata,              // live bits read; else 0
-    input  wire  [31:0] clk_hz,             // frequency of clk [Hz]
-    input  wire  [ 3:0] build_axes,         // what is built: axes
-    input  wire  [ 3:0] build_address,      // what is built: address
-    input  wire  [ 7:0] build_memory,       // what is built: memory [1024 byte]
-    input  wire  [63:0] time_stamp,         // cycles since reset, cycle
-    output logic [23:0] tick_period,        // period of the servo tick, cycle
-    output logic [15:0] sample_period,      // period of the samples, cycle
-    output logic        heartbeat_kick,     // strobe: heartbeat of the firmware
-    output logic [ 7:0] start_axes,         // axes that start
-    output logic        start_axes_written  // strobe: new value
+    input  wire         rst,                 // settings take their first values
+    input  wire         select,              // strobe: access to this block
+    input  wire         write,               // level: it writes wdata
+    input  wire  [ 5:0] word,                // index of the word
+    input  wire  [31:0] wdata,               // value to write
+    output logic [31:0] rdata,               // live bits read; else 0
+    input  wire  [31:0] clk_hz,              // frequency of clk [Hz]
+    input  wire  [ 3:0] build_axes,          // what is built: axes
+    input  wire  [ 3:0] build_address,       // what is built: address
+    input  wire  [ 7:0] build_memory,        // what is built: memory [1024 byte]
+    input  wire  [63:0] time_stamp,          // cycles since reset, cycle
+    output logic [23:0] tick_period,         // period of the servo tick, cycle
+    output logic [15:0] sample_period,       // period of the samples, cycle
+    output logic        heartbeat_kick,      // strobe: heartbeat of the firmware
+    output logic [ 7:0] start_axes,          // axes that start
+    output logic        start_axes_written,  // strobe: new value
+    output logic [19:0] wait_time,           // longest wait of the soft core, cycle
+    output logic        wait_time_written    // strobe: new value
 );
     logic [31:0] time_stamp_high;
     logic        get_map_crc;
@@ -42,7 +44,7 @@ module node_registers (
     wire         unused = &{1'b0, wdata[31:24]};
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'h49D04E40) | ({32{get_clk_hz}} & clk_hz) |
+    assign rdata = ({32{get_map_crc}} & 32'hCD4EB02A) | ({32{get_clk_hz}} & clk_hz) |
         ({32{get_build}} & {16'd0, build_memory, build_address, build_axes}) | ({32{get_time_stamp}}
         & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high);
 
@@ -59,6 +61,8 @@ module node_registers (
         heartbeat_kick <= put && word == 6'h08 && wdata[0];
         start_axes_written <= put && word == 6'h09;
         if (put && word == 6'h09) start_axes <= wdata[7:0];
+        wait_time_written <= put && word == 6'h0A;
+        if (put && word == 6'h0A) wait_time <= wdata[19:0];
 
         if (rst) begin
             get_map_crc <= 1'b0;
@@ -72,6 +76,8 @@ module node_registers (
             heartbeat_kick <= 1'b0;
             start_axes_written <= 1'b0;
             start_axes <= 8'h00;
+            wait_time_written <= 1'b0;
+            wait_time <= 20'h00000;
         end
     end
 endmodule

@@ -407,6 +407,8 @@ static void update_baud(void) {
         switch_baud(BAUD);
 }
 
+bool bus_idle(void) { return baud == BAUD && !next_baud && !sync_axes; }
+
 void bus_poll(void) {
     update_baud();
     poll_sync();
