@@ -10,7 +10,7 @@
 #include "axis/parameters.h"
 #include "planner/planner.h"
 
-#define LONGEST_IDLE_TICKS 16u
+#define LONGEST_IDLE_TICKS 32u  // 8 ms
 
 static unsigned axes;  // number that may be accessed: 0 if the register maps differ
 
