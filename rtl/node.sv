@@ -127,7 +127,7 @@ module node #(
     wire tick, sample_tick, limit_tick, restart_tick;
     // waiting of the soft core
     wire wait_time_written, word_received;
-    wire [19:0] wait_time;
+    wire [23:0] wait_time;
     // start of several axes
     wire start_axes_written, sync;
     wire [7:0] start_axes, sync_axes;

@@ -13,7 +13,7 @@
 `default_nettype none
 
 module core_wait #(
-    parameter int W = 20  // bits of cycles
+    parameter int W = 24  // bits of cycles
 ) (
     input  wire          clk,
     input  wire          rst,

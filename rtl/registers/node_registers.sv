@@ -27,7 +27,7 @@ module node_registers (
     output logic        heartbeat_kick,      // strobe: heartbeat of the firmware
     output logic [ 7:0] start_axes,          // axes that start
     output logic        start_axes_written,  // strobe: new value
-    output logic [19:0] wait_time,           // longest wait of the soft core, cycle
+    output logic [23:0] wait_time,           // longest wait of the soft core, cycle
     output logic        wait_time_written    // strobe: new value
 );
     logic [31:0] time_stamp_high;
@@ -44,7 +44,7 @@ module node_registers (
     wire         unused = &{1'b0, wdata[31:24]};
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'hCD4EB02A) | ({32{get_clk_hz}} & clk_hz) |
+    assign rdata = ({32{get_map_crc}} & 32'hBBFAB873) | ({32{get_clk_hz}} & clk_hz) |
         ({32{get_build}} & {16'd0, build_memory, build_address, build_axes}) | ({32{get_time_stamp}}
         & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high);
 
@@ -62,7 +62,7 @@ module node_registers (
         start_axes_written <= put && word == 6'h09;
         if (put && word == 6'h09) start_axes <= wdata[7:0];
         wait_time_written <= put && word == 6'h0A;
-        if (put && word == 6'h0A) wait_time <= wdata[19:0];
+        if (put && word == 6'h0A) wait_time <= wdata[23:0];
 
         if (rst) begin
             get_map_crc <= 1'b0;
@@ -77,7 +77,7 @@ module node_registers (
             start_axes_written <= 1'b0;
             start_axes <= 8'h00;
             wait_time_written <= 1'b0;
-            wait_time <= 20'h00000;
+            wait_time <= 24'h000000;
         end
     end
 endmodule

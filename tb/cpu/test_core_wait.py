@@ -65,6 +65,6 @@ async def random_levels_match_the_model(dut):
         assert await cycle(dut, **inputs) == model.step(**inputs), f"cycle {n}"
 
 
-@pytest.mark.parametrize("w", [8, 20])
+@pytest.mark.parametrize("w", [8, 24])
 def test_core_wait(w):
     run("core_wait", __file__, W=w)

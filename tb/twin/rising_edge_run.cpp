@@ -13,7 +13,9 @@
 #include "verilated_node.h"  // made by twin/build.py
 #include "signals.h"         // made by test_rising_edge.py: INPUTS(X), REGISTERS(X), MEMORIES(X)
 
-constexpr unsigned QUIET = 64;          // an input keeps its level for so many cycles on average
+// An input keeps its level for so many cycles on average: in the first half of the cycles, and in
+// the second, in which the soft core waits and the other part of the node rests.
+constexpr unsigned LIVELY = 64, QUIET = 65536;
 constexpr uint64_t RESET_CYCLES = 16;   // at the beginning
 constexpr uint64_t MEMORY_CYCLES = 97;  // from one look at the memories to the next
 
@@ -39,10 +41,10 @@ int main(int count, char** arguments) {
     std::string word;
     for (int n = 0; firmware >> word; n++)
         a.NODE_MEMORY[n] = b.NODE_MEMORY[n] = uint32_t(std::stoul(word, nullptr, 16));
-    uint64_t driving = 0;
+    uint64_t driving = 0, rested = 0;
     for (uint64_t n = 0; n < cycles; n++) {
 #define SET(name, mask) \
-    if (random() % QUIET == 0) a.name = b.name = uint64_t(random()) & mask;
+    if (random() % (n < cycles / 2 ? LIVELY : QUIET) == 0) a.name = b.name = uint64_t(random()) & mask;
         INPUTS(SET)
         a.rst = b.rst = n < RESET_CYCLES;
         cycle(theirs);
@@ -60,7 +62,9 @@ int main(int count, char** arguments) {
             MEMORIES(COMPARE)
         }
         driving += a.rs485_driver_enable;
+        rested += rest.known;
     }
-    std::printf("the same for %llu cycles; the node drove the bus in %llu of them\n",
-                (unsigned long long)cycles, (unsigned long long)driving);
+    std::printf("the same for %llu cycles; the node drove the bus in %llu, and rested in %llu\n",
+                (unsigned long long)cycles, (unsigned long long)driving,
+                (unsigned long long)rested);
 }

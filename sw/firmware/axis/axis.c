@@ -22,7 +22,7 @@
 #define EASE 8             // decrease of the motor command per millisecond in the fine stage
 
 // Longest time between two polls: nothing happens without a request
-#define OFF_TICKS 32u     // while the drive is off
+#define OFF_TICKS 64u     // while the drive is off
 #define HOLDING_TICKS 1u  // at standstill: only a fault, which has switched the drive off already
 
 enum drive { BRIDGE, STEPS, DAC_OUTPUT };

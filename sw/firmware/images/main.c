@@ -10,7 +10,7 @@
 #include "axis/parameters.h"
 #include "planner/planner.h"
 
-#define LONGEST_IDLE_TICKS 32u  // 8 ms
+#define LONGEST_IDLE_TICKS 64u  // 16 ms
 
 static unsigned axes;  // number that may be accessed: 0 if the register maps differ
 
