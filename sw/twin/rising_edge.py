@@ -8,6 +8,10 @@ only one branch of a condition needs is computed in this branch. The registers, 
 after each edge are the same, bit for bit; tb/twin/test_rising_edge.py compares them. Reset is left
 to Verilator's evaluation: in the function it is low.
 
+While the soft core waits, most of the node rests: its registers stay as they are until one of its
+inputs changes. Such an edge evaluates only the other part. Which part works is a list of names; a
+wrong list costs time, but the result is the same.
+
 Everything here works on the text that `verilator --no-decoration` makes: one statement a line,
 braces at the ends of lines.
 """
@@ -194,14 +198,14 @@ class Parser:
         return Plain((line,), Effect(needs | self.names(index) | target, NONE, target))
 
     def choice(self, condition: str) -> Statement:
-        """An if, whose line is the next. What is only for reset is left out."""
+        """An if, whose line is the next."""
         self.at += 1
         yes = self.block()
         no: tuple[Statement, ...] = ()
         line = self.end()
         if line.startswith("} else if (") and line.endswith(") {"):
             no = (self.choice(line[11:-3]),)
-            return Group(no) if condition == NEVER else Choice(condition, self.names(condition), yes, no)
+            return self.chosen(condition, yes, no)
         self.at += 1
         if line == "} else {":
             no = self.block()
@@ -209,7 +213,15 @@ class Parser:
             self.at += 1
         if line != "}":
             raise FormError(f"a block ends with {line!r}")
-        return Group(no) if condition == NEVER else Choice(condition, self.names(condition), yes, no)
+        return self.chosen(condition, yes, no)
+
+    def chosen(
+        self, condition: str, yes: tuple[Statement, ...], no: tuple[Statement, ...]
+    ) -> Statement:
+        """A choice, without what is only for reset."""
+        if condition == NEVER:
+            return Group(no)
+        return Choice(condition, self.names(condition), yes, no)
 
     def end(self) -> str:
         """The line that ends a block."""
@@ -306,8 +318,9 @@ def array(name: str) -> str:
 
 def logic_first(design: Design) -> tuple[list[Statement], list[Statement]]:
     """The program of an edge in two parts: its logic, which goes to the beginning instead of the
-    end, where it sees the inputs of the new cycle; and all that stays. A statement goes there if no statement that stays behind it has to do
-    with what it computes or changes what it uses. Statements of flip-flops never go.
+    end, where it sees the inputs of the new cycle; and all that stays. A statement goes if no
+    statement that stays behind it has to do with what it computes or changes what it uses.
+    Statements of flip-flops never go.
     """
     stays: set[int] = set()
     while True:
@@ -536,14 +549,11 @@ class Rest:
     @cached_property
     def registers(self) -> set[str]:
         """What must be as before: the inputs that last, and the registers of the resting part."""
-        return (self.inputs - self.logic_inputs | set(self.changes(False)) & self.state) & set(
-            self.design.types
-        )
+        lasting = self.inputs - self.logic_inputs | set(self.changes(False)) & self.state
+        return lasting & (set(self.design.types) | self.design.outputs)
 
 
-def text_of(
-    design: Design, program: Sequence[Statement], kept: set[str], stored: set[str]
-) -> str:
+def text_of(design: Design, program: Sequence[Statement], kept: set[str], stored: set[str]) -> str:
     """The C++ of a program. Signals are local variables unless they are kept; those that are stored
     are in `rest`.
     """
@@ -571,18 +581,21 @@ def flagged(text: str, arrays: set[str], flag: str) -> str:
     for line in text.splitlines():
         lines.append(line)
         match = ASSIGNMENT.fullmatch(line)
-        if match and match[1] in arrays:
+        changed = {match[1]} if match else set(NAME.findall(line)) if line[:3] == "VL_" else set()
+        if changed & arrays:
             lines.append(flag)
     return "\n".join(lines)
 
 
 def differs(kind: str, a: str, b: str) -> str:
-    """An expression that is not 0 if two signals differ."""
-    return f"!!std::memcmp(&{a}, &{b}, sizeof {a})" if kind.startswith("VlWide") else f"({a} != {b})"
+    """An expression that is not 0 if two signals of a type differ."""
+    if kind.startswith("VlWide"):
+        return f"!!std::memcmp(&{a}, &{b}, sizeof {a})"
+    return f"({a} != {b})"
 
 
 def any_of(conditions: Iterable[str]) -> str:
-    """An expression that is not 0 if one of them is not; it has no branches."""
+    """An expression without branches that is not 0 if one of these is not."""
     return " |\n".join(conditions) or "0"
 
 
@@ -602,48 +615,56 @@ def function(design: Design) -> str:
     arrays = {array(name) for name in whole.changes} - set(types) - design.outputs
     kept = rest.state | design.outputs | rest.results
     stored = rest.results & set(design.locals)
-    every = text_of(design, program, kept | rest.logic_inputs, stored | rest.logic_inputs)
-    # an edge at which the resting part rests: it returns before it has changed anything if not
-    pins = rest.inputs & design.pins
-    registers = sorted(rest.registers | pins)
-    same = any_of(
-        differs(types.get(name, ""), f"vlSelfRef.{name}", f"rest.before_{name}")
-        for name in sorted(rest.inputs & set(registers))
-    )
-    logic_same = any_of(
+    before = sorted(rest.registers | rest.inputs & design.pins)
+
+    def changed_of(names: Iterable[str]) -> str:
+        return any_of(
+            differs(types.get(name, ""), f"vlSelfRef.{name}", f"rest.before_{name}")
+            for name in names
+        )
+
+    # all logic inputs are stored at a whole edge, and are variables at one that leaves out the rest
+    whole_edge = text_of(design, program, kept | rest.logic_inputs, stored | rest.logic_inputs)
+    logic_changed = any_of(
         differs(types[name], name, f"rest.{name}") for name in sorted(rest.logic_inputs)
     )
-    names = frozenset(n for n in whole.changes if array(n) in rest.logic_inputs)
-    check = Plain((f"if ({logic_same}) return false;",), Effect(names, NONE, frozenset(["return"])))
-    working = [[s for n, s in enumerate(program) if n in rest.works and (n < len(logic)) == first]
-               for first in (True, False)]
-    resting = text_of(design, [*working[0], check, *working[1]], kept, stored)
-    fields = [f"{types[name]} {name};" for name in sorted(stored | rest.logic_inputs)]
-    fields += [f"decltype({ROOT}::{name}) before_{name};" for name in registers]
-    return f"""struct Rest {{
-bool known = false;
-bool written;
-{chr(10).join(fields)}
-}};
-static bool rests({ROOT}& vlSelfRef, Rest& rest) {{
-if ({same}) return false;
-{flagged(resting, arrays & rest.inputs, "rest.known = false;")}
-return true;
-}}
-static void every_edge({ROOT}& vlSelfRef, Rest& rest) {{
-{flagged(every, arrays & set(rest.changes(False)), "rest.written = true;")}
-}}
-static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{
-if (rest.known && rests(vlSelfRef, rest)) return;
-rest.known = false;
-if (!({WAITS})) {{
-every_edge(vlSelfRef, rest);
-return;
-}}
-rest.written = false;
-{chr(10).join(f"rest.before_{name} = vlSelfRef.{name};" for name in registers)}
-every_edge(vlSelfRef, rest);
-rest.known = !(rest.written |
-{any_of(differs(types.get(name, ""), f"vlSelfRef.{name}", f"rest.before_{name}") for name in registers)});
-}}
-"""
+    check = Plain(
+        (f"if ({logic_changed}) return false;",),
+        Effect(
+            frozenset(name for name in whole.changes if array(name) in rest.logic_inputs),
+            changes=frozenset(["return"]),
+        ),
+    )
+    working = [statement for n, statement in enumerate(program) if n in rest.works]
+    working.insert(sum(n < len(logic) for n in rest.works), check)
+    partial_edge = text_of(design, working, kept, stored)
+    lines = [
+        "struct Rest {",
+        "bool known = false;",  # nothing but the inputs can change what rests
+        "bool written = false;",  # a memory of what rests was written
+        *(f"{types[name]} {name};" for name in sorted(stored | rest.logic_inputs)),
+        *(f"decltype({ROOT}::{name}) before_{name};" for name in before),
+        "};",
+        # returns false, before it has changed anything, if an input of what rests has changed
+        f"static bool partial_edge({ROOT}& vlSelfRef, Rest& rest) {{",
+        f"if ({changed_of(sorted(rest.inputs & set(before)))}) return false;",
+        flagged(partial_edge, arrays & rest.inputs, "rest.known = false;"),
+        "return true;",
+        "}",
+        f"static void whole_edge({ROOT}& vlSelfRef, Rest& rest) {{",
+        flagged(whole_edge, arrays & set(rest.changes(False)), "rest.written = true;"),
+        "}",
+        f"static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{",
+        "if (rest.known && partial_edge(vlSelfRef, rest)) return;",
+        "rest.known = false;",
+        f"if (!({WAITS})) {{",
+        "whole_edge(vlSelfRef, rest);",
+        "return;",
+        "}",
+        "rest.written = false;",
+        *(f"rest.before_{name} = vlSelfRef.{name};" for name in before),
+        "whole_edge(vlSelfRef, rest);",
+        f"rest.known = !(rest.written | {changed_of(before)});",
+        "}",
+    ]
+    return "\n".join(lines) + "\n"

@@ -118,7 +118,10 @@ def test_logic_goes_first_and_flip_flops_do_not():
 
 def test_logic_of_an_output_stays_behind_its_flip_flop():
     program = design("f", "a = b;", "f = a;")
-    assert [text_of(part) for part in rising_edge.logic_first(program)] == [[], ["a = b;", "f = a;"]]
+    assert [text_of(part) for part in rising_edge.logic_first(program)] == [
+        [],
+        ["a = b;", "f = a;"],
+    ]
 
 
 def test_logic_of_inputs_that_stays_behind_is_refused():
@@ -191,6 +194,7 @@ def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes
     print(f"SEED={seed}")
     output = build.run([program, tmp_path / "firmware", CYCLES, seed], "run of both")
     rested = re.fullmatch(
-        rf"the same for {CYCLES} cycles; the node drove the bus in \d+, and rested in (\d+)\n", output
+        rf"the same for {CYCLES} cycles; the node drove the bus in \d+, and rested in (\d+)\n",
+        output,
     )
     assert rested and int(rested[1]) > CYCLES / 10
