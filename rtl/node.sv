@@ -114,7 +114,7 @@ module node #(
     wire [15:0] bus_address;
     wire [31:0] wdata, wdata_low, rdata;
     wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata;
-    wire memory_ready, stores, hold, engine_waits;
+    wire memory_ready, stores, hold, engine_waits, core_waits;
     wire [13:0] stored_at;
     wire [31:0] stored_value;
     wire [32*AXES-1:0] axis_rdata, feedback_rdata, actuator_rdata;
@@ -124,6 +124,9 @@ module node #(
     wire [23:0] tick_period;
     wire [15:0] sample_period;
     wire tick, sample_tick, limit_tick, restart_tick;
+    // waiting of the soft core
+    wire wait_time_written, word_received;
+    wire [23:0] wait_time;
     // start of several axes
     wire start_axes_written, sync;
     wire [7:0] start_axes, sync_axes;
@@ -161,7 +164,7 @@ module node #(
     ) u_core (
         .clk,
         .rst,
-        .ready  (memory_ready && !engine_waits),
+        .ready  (memory_ready && !engine_waits && !core_waits),
         .select,
         .write,
         .address(bus_address),
@@ -244,7 +247,19 @@ module node #(
         // firmware
         .heartbeat_kick,
         .start_axes,
-        .start_axes_written
+        .start_axes_written,
+        .wait_time,
+        .wait_time_written
+    );
+
+    // the soft core waits while it has nothing to do
+    core_wait u_core_wait (
+        .clk,
+        .rst,
+        .start (wait_time_written),
+        .cycles(wait_time),
+        .wake  (word_received),
+        .waits (core_waits)
     );
 
     // time
@@ -385,6 +400,7 @@ module node #(
         .address,
         .armed,
         .watchdog_expired,
+        .word_received,
         .sync,
         .sync_axes,
         // pins

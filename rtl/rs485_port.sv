@@ -23,6 +23,7 @@ module rs485_port #(
     input  wire  [ 3:0] address,             // address of the node on the bus
     input  wire         armed,               // level: a drive is on
     output logic        watchdog_expired,    // level: the master has been silent too long
+    output logic        word_received,       // level: a received word has not been read
     output logic        sync,                // strobe: sync pulse of the bus
     output logic [ 7:0] sync_axes,           // bit n: axis n starts with sync
     // pins
@@ -219,6 +220,8 @@ module rs485_port #(
         .transmit_timeouts  (transmit_expired),
         .syncs              (sync)
     );
+
+    assign word_received = receive_present;
 
     wire unused = &{1'b0, receiving, receive_free, transmit_overrun};
 endmodule

@@ -412,6 +412,7 @@ def verilate_node(
     includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
     (folder / "verilated_node.h").write_text(
         "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
+        "#include <cstring>\n"
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
         f"#define NODE_MEMORY {words[0]}\n{evaluation}"

@@ -26,6 +26,12 @@ void calibration_axes_work(void) {
     calibration_driver_poll(served);
 }
 
+bool calibration_axes_idle(void) {
+    for (unsigned n = 0; n < axes; n++)
+        if (!calibration_driver_idle(n)) return false;
+    return true;
+}
+
 static uint8_t calibration(unsigned axis) {
     const struct calibration* calibration = calibration_driver_state(axis);
     uint8_t cause =

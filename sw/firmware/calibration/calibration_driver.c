@@ -157,6 +157,13 @@ void calibration_driver_start(unsigned n) {
     feedback_clear_signal_faults(n);
 }
 
+// A burst is needed, but the axis is too slow.
+static bool at_standstill(const struct calibration_driver* driver) {
+    bool waiting = driver->calibration.need == CALIBRATION_NEEDS_SAMPLES ||
+                   driver->calibration.need == CALIBRATION_NEEDS_PHASES;
+    return waiting && !driver->moving && !driver->recording;
+}
+
 static void follow_parameter(unsigned n) {
     struct calibration_driver* driver = &drivers[n];
     uint8_t mode = (uint8_t)parameters_get(n, BUS_PARAMETER_AUTO_CALIBRATION);
@@ -179,14 +186,15 @@ void calibration_driver_poll(unsigned n) {
     }
 }
 
+bool calibration_driver_idle(unsigned n) {
+    return drivers[n].calibration.need == CALIBRATION_NEEDS_NOTHING || at_standstill(&drivers[n]);
+}
+
 const struct calibration* calibration_driver_state(unsigned n) { return &drivers[n].calibration; }
 
 uint8_t calibration_driver_reason(unsigned n) {
     const struct calibration_driver* driver = &drivers[n];
-    bool waiting = driver->calibration.need == CALIBRATION_NEEDS_SAMPLES ||
-                   driver->calibration.need == CALIBRATION_NEEDS_PHASES;
-    if (waiting && !driver->moving && !driver->recording &&
-        driver->calibration.reason < BUS_CALIBRATION_REASON_ONE_SPEED)
+    if (at_standstill(driver) && driver->calibration.reason < BUS_CALIBRATION_REASON_ONE_SPEED)
         return BUS_CALIBRATION_REASON_STANDSTILL;
     return driver->calibration.reason;
 }

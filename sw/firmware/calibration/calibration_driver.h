@@ -17,6 +17,8 @@ void calibration_driver_start(unsigned n);
 
 // One small piece of work, about 1 ms at most.
 void calibration_driver_poll(unsigned n);
+// Whether there is nothing to do but to see that the axis moves.
+bool calibration_driver_idle(unsigned n);
 
 const struct calibration* calibration_driver_state(unsigned n);
 uint8_t calibration_driver_reason(unsigned n);  // a bus_calibration_reason

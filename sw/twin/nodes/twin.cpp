@@ -40,15 +40,20 @@ class Core {  // a Verilated node and its clock
         pins.rst = 1;
         model_->eval();
         std::copy(firmware.begin(), firmware.end(), &pins.NODE_MEMORY[0]);
-        for (int n = 0; n < RESET_CLK; n++) clk();
+        for (int n = 0; n < RESET_CLK; n++)
+            for (const int level : {1, 0}) {
+                pins.clk = level;
+                model_->eval();
+            }
         pins.rst = 0;
     }
     ~Core() { model_->final(); }
-    void clk() { rising_edge(pins); }
+    void clk() { rising_edge(pins, rest_); }  // not in reset
 
  private:
     std::unique_ptr<VerilatedContext> context_;
     std::unique_ptr<Vnode> model_;
+    Rest rest_;
 
  public:
     Vnode___024root& pins;
