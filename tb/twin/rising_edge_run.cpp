@@ -43,8 +43,9 @@ int main(int count, char** arguments) {
         a.NODE_MEMORY[n] = b.NODE_MEMORY[n] = uint32_t(std::stoul(word, nullptr, 16));
     uint64_t driving = 0, rested = 0;
     for (uint64_t n = 0; n < cycles; n++) {
-#define SET(name, mask) \
-    if (random() % (n < cycles / 2 ? LIVELY : QUIET) == 0) a.name = b.name = uint64_t(random()) & mask;
+#define SET(name, mask)                                    \
+    if (random() % (n < cycles / 2 ? LIVELY : QUIET) == 0) \
+        a.name = b.name = uint64_t(random()) & mask;
         INPUTS(SET)
         a.rst = b.rst = n < RESET_CYCLES;
         cycle(theirs);

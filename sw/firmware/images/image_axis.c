@@ -7,7 +7,8 @@
 #include "bus/segments.h"
 
 const struct image_part image_parts[] = {
-    {calibration_axes_start, calibration_axes_work, calibration_axes_operation, calibration_axes_idle},
+    {calibration_axes_start, calibration_axes_work, calibration_axes_operation,
+     calibration_axes_idle},
     {segments_start, segments_work, segments_operation, segments_idle},
     {scope_start, scope_work, scope_operation, scope_idle},
 };
