@@ -41,8 +41,9 @@ WAITS = (
 )
 WORKS = re.compile(
     r"(?:^|__DOT__)(?:now|u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|u_core_wait__\w+|"
-    r"u_engine__DOT__(?!u_settings)\w+|u_lines__\w+|u_chain__\w+|u_monitor__\w+|u_adc__\w+|age|since|timer|"
-    r"limit_tick|sample_tick|due|scale_valid|stepped|counted|strobe|arrived|result_\w+)$"
+    r"u_engine__DOT__(?!u_settings)\w+|u_lines__\w+|u_chain__\w+|u_monitor__\w+|"
+    r"u_adc__\w+|age|since|timer|limit_tick|sample_tick|due|scale_valid|stepped|counted|strobe|"
+    r"arrived|result_\w+)$"
 )
 PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
 

@@ -27,7 +27,7 @@ async def begin(dut):
 
 
 @cocotb.test()
-async def a_wait_begins_after_1_cycle_and_lasts_as_many_as_are_set(dut):
+async def latency_is_1_cycle_and_the_wait_lasts_as_many_cycles_as_are_set(dut):
     await begin(dut)
     for cycles in (1, 2, 3, 200):
         assert await cycle(dut, start=1, cycles=cycles)
