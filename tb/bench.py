@@ -3,6 +3,7 @@
 
 SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside the results, under
                                             build/)
+NETLIST=ecp5|ice40     the netlist that Yosys makes of the module, in place of its RTL
 """
 
 import fcntl
@@ -18,6 +19,8 @@ import pytest
 from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
+
+from tb.netlist import netlist
 
 ROOT = Path(__file__).resolve().parent.parent
 BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself
@@ -94,7 +97,8 @@ def run(top, test, **parameters):
     tag = "-".join([top, *(f"{k}{v}" for k, v in values.items()), *(["waves"] if waves else [])])
     if not re.fullmatch(r"[\w.-]{1,100}", tag):
         tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
-    shared = ROOT / "build" / sim / tag
+    family = os.environ.get("NETLIST")
+    shared = ROOT / "build" / (f"{sim}-{family}" if family else sim) / tag
     own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
     own.mkdir(parents=True, exist_ok=True)
     runner, build = (
@@ -107,6 +111,8 @@ def run(top, test, **parameters):
     else:
         sources, args = [w for w in WAIVERS if w.exists()], [*args, "+libext+.sv+.v", "-Wall"]
         direct_verilator(runner)
+    if family:
+        sources, source, args = of_netlist(sim, family, source, parameters)
     with open(shared / "lock", "w") as lock:  # parallel workers may want the same build
         fcntl.flock(lock, fcntl.LOCK_EX)
         runner.build(
@@ -121,10 +127,10 @@ def run(top, test, **parameters):
         )
     module = ".".join(here.relative_to(ROOT).with_suffix("").parts)
     number = seed()
-    print(f"{top} under {sim}, SEED={number}", flush=True)
-    failed = (
-        f"{top} under {sim}: {{}}. Again: make test K={name.split('[')[0]} SIM={sim} SEED={number}"
-    )
+    what = f"{top} under {sim}" + (f" as a netlist for {family}" if family else "")
+    print(f"{what}, SEED={number}", flush=True)
+    again = f"SIM={sim} SEED={number}" + (f" NETLIST={family}" if family else "")
+    failed = f"{what}: {{}}. Again: make test K={name.split('[')[0]} {again}"
     try:
         count, wrong = results(
             runner.test(
@@ -149,6 +155,19 @@ def run(top, test, **parameters):
             ),
             pytrace=False,
         )
+
+
+def of_netlist(sim, family, source, parameters):
+    """(other sources, source of the top, arguments) of the simulation of a module's netlist."""
+    *others, top = netlist.sources(family, source, parameters, search_path())
+    quiet = ["-Wno-timescale"] if sim == "icarus" else ["-Wno-lint", "-Wno-style", "-Wno-fatal"]
+    return others, top, quiet
+
+
+def rtl_only(reason):
+    """In a cocotb test: skip it on a netlist, for a reason such as what it reads inside."""
+    if os.environ.get("NETLIST"):
+        pytest.skip(reason)
 
 
 def results(path):
