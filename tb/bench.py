@@ -20,7 +20,7 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
-from tb.netlist import netlist
+from twin import netlist
 
 ROOT = Path(__file__).resolve().parent.parent
 BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself

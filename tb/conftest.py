@@ -3,7 +3,9 @@
 short runs. Files that take long come first, so that none of them is left to one worker at the end.
 """
 
+import inspect
 import os
+import re
 
 from tb.bench import seed
 from twin.build import SHORT_RUNS
@@ -13,12 +15,19 @@ DRAWN = os.environ.get("SEED") == "random"
 SEED = seed()
 
 
+SIMULATES = re.compile(
+    r"\brun\([^()]*(\([^()]*\))?[^()]*__file__"
+)  # a test of a block has a netlist
 LONG = ("docs", "system", "control", "twin", "peripheral")  # folders, from the longest on
 
 
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     order = {name: n for n, name in enumerate(LONG)}
     items.sort(key=lambda item: order.get(item.path.parent.name, len(LONG)))
+    if os.environ.get("NETLIST"):
+        blocks = [item for item in items if SIMULATES.search(inspect.getsource(item.function))]
+        config.hook.pytest_deselected(items=[item for item in items if item not in blocks])
+        items[:] = blocks
 
 
 def pytest_terminal_summary(terminalreporter):

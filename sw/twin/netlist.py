@@ -17,11 +17,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
+BODIES = HERE / "primitives"
 ROOT = HERE.parents[1]
 BUILD = ROOT / "build" / "netlist"
 FAMILIES = ("ecp5", "ice40")
@@ -34,16 +37,22 @@ BUSES = {  # of their ports of one bit each
 }
 
 
+Parameters = Mapping[str, int | str]
+
+
 class NetlistError(Exception):
     """One line that says why there is no netlist."""
 
 
-def share():
+def share() -> Path:
     """Yosys's folder of models and maps."""
-    return Path(find_spec("pyosys").submodule_search_locations[0]) / "share"
+    found = find_spec("pyosys")
+    if not found or not found.submodule_search_locations:
+        raise NetlistError("the package pyosys is missing")
+    return Path(found.submodule_search_locations[0]) / "share"
 
 
-def module_of(text, name):
+def module_of(text: str, name: str) -> str:
     """A module, without its end."""
     found = re.search(rf"^module {name}\b.*?^(?=endmodule)", text, re.MULTILINE | re.DOTALL)
     if not found:
@@ -51,7 +60,7 @@ def module_of(text, name):
     return found[0]
 
 
-def rows():
+def rows() -> str:
     """The initial contents of a DP16KD: 64 parameters of 16 words of 18 bits, 20 bits apart."""
     return "\n".join(
         f"for (n = 0; n < 8; n = n + 1) rows[{8 * n} + n] = "
@@ -60,7 +69,7 @@ def rows():
     )
 
 
-def filled(name, body):
+def filled(name: str, body: str) -> str:
     """Our body of a primitive, with the buses that its ports of one bit form."""
     for bus, width in BUSES[name].items():
         bits = ", ".join(f"{bus}{bit}" for bit in reversed(range(width)))
@@ -68,7 +77,7 @@ def filled(name, body):
     return body.replace("`ROWS", rows())
 
 
-def primitives_ecp5():
+def primitives_ecp5() -> str:
     folder = share() / "ecp5"
     text = "".join(
         (folder / name).read_text() for name in ("common_sim.vh", "ccu2c_sim.vh", "cells_sim.v")
@@ -80,16 +89,16 @@ def primitives_ecp5():
     ours = {name: module_of(boxes, name) for name in OURS}
     text = text.replace(f"(* blackbox *)\n{ours['DP16KD']}endmodule", "")
     for name, file in OURS.items():
-        text += f"\n{ours[name]}{filled(name, (HERE / file).read_text())}endmodule\n"
+        text += f"\n{ours[name]}{filled(name, (BODIES / file).read_text())}endmodule\n"
     return text
 
 
-def primitives_ice40():
+def primitives_ice40() -> str:
     text = (share() / "ice40" / "cells_sim.v").read_text()
     return f"`define NO_ICE40_DEFAULT_ASSIGNMENTS\n{text}"
 
 
-def primitives(family):
+def primitives(family: str) -> str:
     """The models of a family's primitives, as the text of one file."""
     text = primitives_ecp5() if family == "ecp5" else primitives_ice40()
     return f"`default_nettype wire\n`timescale 1ns/1ps\n{TIMING.sub('', text)}".replace(
@@ -97,14 +106,15 @@ def primitives(family):
     )
 
 
-def literal(value):
+def literal(value: int | str) -> str:
     return f'"{value}"' if isinstance(value, str) else str(int(value))
 
 
-def parts(source, folders):
+def parts(source: Path, folders: Sequence[Path]) -> dict[Path, str]:
     """The source and, below it, every file of these folders whose module it names."""
     known = {path.stem: path for d in folders for path in sorted(d.glob("*.*v"))}
-    found, left = {}, [source]
+    found: dict[Path, str] = {}
+    left = [source]
     while left:
         path = left.pop()
         if path not in found:
@@ -113,11 +123,11 @@ def parts(source, folders):
     return found
 
 
-def digest(family, source, parameters, folders):
+def digest(family: str, source: Path, parameters: Parameters, folders: Sequence[Path]) -> str:
     """A name for everything that the netlist depends on."""
     total = hashlib.sha256(repr((family, source.stem, sorted(parameters.items()))).encode())
     total.update(version("pyosys").encode())
-    for path in (*sorted(HERE.glob("*.vh")), Path(__file__), ROOT / "tools" / "yosys.py"):
+    for path in (*sorted(BODIES.glob("*.vh")), Path(__file__), ROOT / "tools" / "yosys.py"):
         total.update(path.read_bytes())
     for path, text in sorted(parts(source, folders).items()):
         total.update(path.name.encode() + text.encode())
@@ -127,7 +137,7 @@ def digest(family, source, parameters, folders):
     return total.hexdigest()[:16]
 
 
-def value_of(bits):
+def value_of(bits: str) -> str:
     """A parameter's value in Yosys's JSON, as Verilog."""
     if re.fullmatch(r"[01xz]+", bits):
         number = int(re.sub("[xz]", "0", bits), 2)
@@ -135,7 +145,7 @@ def value_of(bits):
     return f'"{bits.rstrip()}"'
 
 
-def wrapper(top, module):
+def wrapper(top: str, module: dict[str, Any]) -> str:
     """A module of the netlist's name, ports and parameters, around the netlist."""
     parameters = module.get("parameter_default_values", {})
     listed = ",\n".join(f"    parameter {p} = {value_of(v)}" for p, v in parameters.items())
@@ -152,7 +162,9 @@ def wrapper(top, module):
     return f"{head}\n{declared}\n);\n    {top}{SUFFIX} u_netlist (\n{joined}\n    );\nendmodule\n"
 
 
-def synthesise(family, source, parameters, folders, out):
+def synthesise(
+    family: str, source: Path, parameters: Parameters, folders: Sequence[Path], out: Path
+) -> None:
     """Yosys writes netlist.v and the interface of the module into the folder `out`."""
     top = source.stem
     change = "".join(f" -set {name} {literal(value)}" for name, value in parameters.items())
@@ -179,7 +191,9 @@ def synthesise(family, source, parameters, folders, out):
     (out / "interface.json").unlink()
 
 
-def sources(family, source, parameters, folders):
+def sources(
+    family: str, source: Path, parameters: Parameters, folders: Sequence[Path]
+) -> list[Path]:
     """[primitives, netlist, wrapper] of a module with these parameters: what a simulation compiles
     in place of its RTL.
     """

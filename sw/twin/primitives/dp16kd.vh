@@ -7,7 +7,6 @@
 
     generate
         if (REGMODE_A != "NOREG" || REGMODE_B != "NOREG") DP16KD_OUTPUT_REGISTERS u_error ();
-        if (RESETMODE != "SYNC") DP16KD_ASYNCHRONOUS_RESET u_error ();
         if (CSDECODE_A != "0b000" || CSDECODE_B != "0b000") DP16KD_CHIP_SELECT u_error ();
     endgenerate
 
@@ -64,6 +63,9 @@
     wire [35:0] now_b = WRITEMODE_B == "WRITETHROUGH" && writes_b
         ? ((rows[adb[13:5]] & ~change_b) | (new_b & change_b)) >> first_bit(adb, DATA_WIDTH_B) : old_b;
 
+    wire        arsta = RESETMODE == "ASYNC" && RSTA;
+    wire        arstb = RESETMODE == "ASYNC" && RSTB;
+
     integer a, b, n;
     initial begin
         `ROWS
@@ -81,16 +83,16 @@
     // a port of 36 bits reads through both outputs
     generate
         if (DATA_WIDTH_B == 36) begin
-            always @(posedge clkb) begin
+            always @(posedge clkb, posedge arstb) begin
                 if (RSTB) {dob, doa} <= 36'b0;
                 else if (CEB) {dob, doa} <= old_b;
             end
         end else begin
-            always @(posedge clka) begin
+            always @(posedge clka, posedge arsta) begin
                 if (RSTA) doa <= 18'b0;
                 else if (CEA && (!writes_a || WRITEMODE_A != "NORMAL")) doa <= now_a[17:0];
             end
-            always @(posedge clkb) begin
+            always @(posedge clkb, posedge arstb) begin
                 if (RSTB) dob <= 18'b0;
                 else if (CEB && (!writes_b || WRITEMODE_B != "NORMAL")) dob <= now_b[17:0];
             end
