@@ -19,13 +19,24 @@ SIMULATES = re.compile(
     r"\brun\([^()]*(\([^()]*\))?[^()]*__file__"
 )  # a test of a block has a netlist
 LONG = ("docs", "system", "control", "twin", "peripheral")  # folders, from the longest on
+NODE_TESTS = ("test_twin.py", "test_s0_stage.py")  # of a node, which run on its netlist too
+
+
+def of_block(item):
+    """Whether a test simulates a block by tb.bench.run."""
+    return bool(SIMULATES.search(inspect.getsource(item.function)))
+
+
+def on_node(item):
+    """Whether a test runs the twin of a node, and there is a netlist of it: the ECP5's."""
+    return os.environ.get("NETLIST") == "ecp5" and item.path.name in NODE_TESTS
 
 
 def pytest_collection_modifyitems(config, items):
     order = {name: n for n, name in enumerate(LONG)}
     items.sort(key=lambda item: order.get(item.path.parent.name, len(LONG)))
-    if os.environ.get("NETLIST"):
-        blocks = [item for item in items if SIMULATES.search(inspect.getsource(item.function))]
+    if os.environ.get("NETLIST") or os.environ.get("POWER_UP"):
+        blocks = [item for item in items if of_block(item) or on_node(item)]
         config.hook.pytest_deselected(items=[item for item in items if item not in blocks])
         items[:] = blocks
 
