@@ -425,7 +425,7 @@ def netlist_of_node(
     image = BUILD / f"{digest([], list(words))}.hex"
     BUILD.mkdir(parents=True, exist_ok=True)
     image.write_text("".join(f"{word:08x}\n" for word in words))
-    values = {
+    values: dict[str, int | str] = {
         "CLK_HZ": clk_hz,
         "AXES": axes,
         "MEMORY_BYTES": MEMORY_BYTES,

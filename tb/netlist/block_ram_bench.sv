@@ -3,8 +3,9 @@
 `default_nettype none
 
 module block_ram_bench #(
-    parameter int W     = 9,    // bits of a word
-    parameter int DEPTH = 2048  // words
+    parameter int W        = 9,     // bits of a word
+    parameter int DEPTH    = 2048,  // words
+    parameter     CONTENTS = ""     // file of the first contents, for $readmemh
 ) (
     input  wire                      clk,
     input  wire                      write,
@@ -16,7 +17,7 @@ module block_ram_bench #(
 );
     logic [W-1:0] memory[DEPTH];
 
-    initial for (int n = 0; n < DEPTH; n++) memory[n] = W'((n * 40503) >> 3);
+    initial if (CONTENTS != "") $readmemh(CONTENTS, memory);
 
     always_ff @(posedge clk) begin
         if (write) memory[write_at] <= data;

@@ -11,7 +11,7 @@ from tb.bench import ROOT
 
 BLOCKS = {  # of each directory: the family, the block, the arguments of its test
     "common": ("ecp5", "axis_memory", {"axes": 5}),
-    "compensate": ("ice40", "harmonic_rotation", {}),
+    "compensate": ("ice40", "harmonic_rotation_rom", {}),
     "control": ("ecp5", "engine_multiplier", {}),
     "cpu": ("ecp5", "node_memory", {}),
     "decode": ("ice40", "index_latch", {"w": 4, "check": 1}),
@@ -35,5 +35,5 @@ def test_each_directory_has_a_block():
 def test_room(room, monkeypatch):
     family, block, arguments = BLOCKS[room]
     monkeypatch.setenv("NETLIST", family)
-    module = import_module(f"tb.{room}.test_{block}")
+    module = import_module(f"tb.{room}.test_{block.removesuffix('_rom')}")
     assert getattr(module, f"test_{block}")(**arguments) is None, "a failure is an exception"

@@ -3,7 +3,8 @@
 // Yosys has no model of it. 512 rows of 36 bits; a port of w bits sees a part of a row, whose first
 // address bits are ADx13..5. Data sheet: Lattice FPGA-TN-02204, "ECP5 and ECP5-5G Memory Usage
 // Guide". What Yosys never makes is refused.
-// A bit that one port writes while the other one reads it is unknown: the data sheet forbids it.
+// A bit that one port writes while the other one reads it is unknown: the data sheet forbids it. Both
+// ports have the same clock.
 
     generate
         if (REGMODE_A != "NOREG" || REGMODE_B != "NOREG") DP16KD_OUTPUT_REGISTERS u_error ();
@@ -49,15 +50,17 @@
     wire [35:0] new_b = dib << first_bit(adb, DATA_WIDTH_B);
     wire        same_row = ada[13:5] == adb[13:5];
 
-    // what a port reads: unknown bits are those that the other one writes
+    // what a port reads; bits that the other one writes at the same clock edge are unknown
     function [35:0] read(
         input [35:0] row, input [35:0] change, input [13:0] address, input integer width
     );
         read = ((row ^ (change & 36'hxxxxxxxxx)) & seen(address, width)) >> first_bit(address, width);
     endfunction
 
-    wire [35:0] old_a = read(rows[ada[13:5]], same_row && clkb ? change_b : 36'b0, ada, DATA_WIDTH_A);
-    wire [35:0] old_b = read(rows[adb[13:5]], same_row && clka ? change_a : 36'b0, adb, DATA_WIDTH_B);
+    wire [35:0] clash_a = same_row && DATA_WIDTH_B != 36 ? change_b : 36'b0;
+    wire [35:0] clash_b = same_row ? change_a : 36'b0;
+    wire [35:0] old_a = read(rows[ada[13:5]], clash_a, ada, DATA_WIDTH_A);
+    wire [35:0] old_b = read(rows[adb[13:5]], clash_b, adb, DATA_WIDTH_B);
     wire [35:0] now_a = WRITEMODE_A == "WRITETHROUGH" && writes_a
         ? ((rows[ada[13:5]] & ~change_a) | (new_a & change_a)) >> first_bit(ada, DATA_WIDTH_A) : old_a;
     wire [35:0] now_b = WRITEMODE_B == "WRITETHROUGH" && writes_b
