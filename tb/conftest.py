@@ -18,7 +18,7 @@ SEED = seed()
 SIMULATES = re.compile(
     r"\brun\([^()]*(\([^()]*\))?[^()]*__file__"
 )  # a test of a block has a netlist
-LONG = ("docs", "system", "control", "twin", "peripheral", "netlist")  # folders, from the longest on
+LONG = ("docs", "system", "control", "twin", "peripheral", "netlist")  # folders, the longest first
 NODE_TESTS = ("test_twin.py", "test_s0_stage.py")  # of a node, which run on its netlist too
 
 
