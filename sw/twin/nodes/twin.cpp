@@ -39,7 +39,9 @@ class Core {  // a Verilated node and its clock
         set_peripheral_pins(pins, PERIPHERAL_SENSE_IDLE);
         pins.rst = 1;
         model_->eval();
+#ifdef NODE_MEMORY  // a netlist has its firmware since synthesis
         std::copy(firmware.begin(), firmware.end(), &pins.NODE_MEMORY[0]);
+#endif
         for (int n = 0; n < RESET_CLK; n++)
             for (const int level : {1, 0}) {
                 pins.clk = level;

@@ -143,9 +143,11 @@ class BusState:
     words_waiting: int
 
 
-def library(clk_hz: int, axes: int, node: Mapping[str, int] | None = None) -> ctypes.CDLL:
+def library(
+    clk_hz: int, axes: int, words: Sequence[int], node: Mapping[str, int] | None = None
+) -> ctypes.CDLL:
     """The library of a build, with its functions declared."""
-    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node)))
+    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node, words)))
     declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **DEVICES_FUNCTIONS, **PEER_FUNCTIONS})
     return found
 
@@ -206,8 +208,9 @@ class Twin:
             for node in built
             for axis in [*node.axes, *[Axis("unconnected")] * (self.node_axes - len(node.axes))]
         ]
+        words = build.firmware(axes=self.node_axes) if firmware is None else firmware
         self.library, self.clk_hz, self.baud = (
-            library(clk_hz, self.node_axes, node_parameters),
+            library(clk_hz, self.node_axes, words, node_parameters),
             clk_hz,
             baud,
         )
@@ -219,9 +222,7 @@ class Twin:
             )
             for n, axis in enumerate(fitted)
         ]
-        image = memory_image(
-            self.library, build.firmware(axes=self.node_axes) if firmware is None else firmware
-        )
+        image = memory_image(self.library, words)
         addresses = array(self.addresses, numpy.uint8)
         kinds = (ctypes.c_char_p * self.axes)(*(axis.machine.encode() for axis in fitted))
         tables = (ctypes.c_void_p * self.axes)(*(ctypes.addressof(table) for table in packed))
@@ -582,8 +583,9 @@ class FrameBench:
         firmware: Sequence[int] | None = None,
     ) -> None:
         self.handle: int | None = None
-        self.library, self.clk_hz = library(clk_hz, 1, NODE), clk_hz
-        image = memory_image(self.library, build.firmware(axes=1) if firmware is None else firmware)
+        words = build.firmware(axes=1) if firmware is None else firmware
+        self.library, self.clk_hz = library(clk_hz, 1, words, NODE), clk_hz
+        image = memory_image(self.library, words)
         self.handle = self.library.frame_bench_new(
             address, image.ctypes.data, len(image), clk_hz / baud
         )
