@@ -13,9 +13,9 @@ import xml.etree.ElementTree
 from collections.abc import Mapping
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, console
+from figures.common import Figure, Quick, console
 from figures.synthesis import SynthesisError
-from twin.build import SHORT_RUNS
+from twin.build import ROOT, SHORT_RUNS
 from twin.netlist import FAMILIES
 
 BUILD = ROOT / "build" / "netlist"
