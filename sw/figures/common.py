@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a figure is, and how the modules of this directory find and measure theirs.
 
-A module that measures has a dictionary FIGURES = {name: Figure}; SOAK = {name: function} holds the
-campaigns that take a night. Both are found by name: a new module needs no registration.
+A module that measures has a dictionary FIGURES = {name: Figure}; CAMPAIGNS = {name: Campaign} holds
+its long tests (campaigns/campaign.py). Both are found by name: a new module needs no registration.
 """
 
 import inspect
@@ -18,6 +18,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from campaigns.campaign import SEEDS_APART
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 TOOLS = {  # modules here that measure nothing
@@ -26,12 +28,9 @@ TOOLS = {  # modules here that measure nothing
     "comparison",
     "figure",
     "record",
-    "soak",
     "synthesis",
 }
 COMPARISONS = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
-SEEDS_APART = 10**6  # more than any figure has runs
-
 console = Console(stderr=True)  # facts and progress; the figure itself goes to standard output
 
 
@@ -126,9 +125,3 @@ def collected(attribute: str) -> dict[str, Any]:
     for module in modules():
         found |= getattr(import_module(f"figures.{module}"), attribute, {})
     return found
-
-
-def soaked(figure: Figure, *arguments: Any) -> tuple[float, bool]:
-    """Result of a campaign that is a figure with more of everything."""
-    value = figure.measure(*arguments)
-    return value, figure.good(value)

@@ -2,14 +2,16 @@
 """Coverage-guided fuzzing of everything that the host package reads: bytes of the bus and of
 clients, files, words on the command line.
 
-    python -m fuzz.parser_fuzz SECONDS [SEED]
+    python -m fuzz.parser_fuzz SECONDS [SEED] [--parser NAME] [--json]
 
 A parser must answer any input, or refuse it with a MoireError; any other exception, and an input
 that takes long, is a crash. An input that reaches a pair of lines that was not reached before joins
 the corpus that the next inputs are made of.
 """
 
+import argparse
 import io
+import json
 import os
 import random
 import signal
@@ -276,6 +278,18 @@ def mutated(draw: random.Random, target: Target) -> bytes:
     return bytes(data[:LONGEST])
 
 
+def counted(target: Target) -> dict[str, Any]:
+    """What became of a target, for other programs."""
+    return {
+        "parser": target.parse.__name__,
+        "runs": target.runs,
+        "seconds": target.seconds,
+        "corpus": len(target.corpus),
+        "pairs": len(target.seen),
+        "crashes": {where: repr(data) for where, data in target.crashes.items()},
+    }
+
+
 class Hang(Exception):
     pass
 
@@ -342,7 +356,18 @@ def fuzz(
 
 
 def main() -> int:
-    targets = fuzz(float(sys.argv[1]), int((sys.argv[2:] or ["1"])[0]))
+    known = {parse.__name__: parse for parse in SEEDS}
+    parser = argparse.ArgumentParser(description="Fuzz the parsers of the host package.")
+    parser.add_argument("seconds", type=float, help="for all parsers together")
+    parser.add_argument("seed", type=int, nargs="?", default=1)
+    parser.add_argument("--parser", choices=known, help="this parser alone")
+    parser.add_argument("--json", action="store_true", help="print the counts as JSON")
+    options = parser.parse_args()
+    chosen = [known[options.parser]] if options.parser else list(SEEDS)
+    targets = fuzz(options.seconds, options.seed, chosen)
+    if options.json:
+        print(json.dumps([counted(target) for target in targets]))
+        return 0
     for target in targets:
         print(
             f"{target.parse.__name__:16} {target.runs:8} runs, a corpus of "
