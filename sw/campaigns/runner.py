@@ -245,7 +245,10 @@ def collect(
 
     for _ in range(WAITING * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))):
         hand_in()
+    stopping = False
     for future in running:
+        if future.key not in waiting:  # cancelled below
+            continue
         job, task, _ = waiting.pop(future.key)
         if future.status == "cancelled" or client.status != "running":
             return False
@@ -265,9 +268,11 @@ def collect(
             watch.done(job, result)
         future.release()
         hand_in()
-        if not goes_on() and waiting:
-            client.cancel([one for _, _, one in waiting.values()], force=True)
-            break
+        if not goes_on() and not stopping:
+            stopping = True
+            at_work = {key for keys in client.processing().values() for key in keys}
+            idle = [key for key in waiting if key not in at_work]
+            client.cancel([waiting.pop(key)[2] for key in idle], force=True)
     return True
 
 
