@@ -12,6 +12,7 @@ import os
 import socket
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -160,23 +161,27 @@ def settings() -> Iterator[None]:
 @contextmanager
 def local(workers: int, processes: bool = True, dashboard: bool = False) -> Iterator[Client]:
     """Workers of this machine, one part at a time each; as threads for tests."""
-    with settings():
+    with settings(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Port .* is already in use", UserWarning)
         cluster = LocalCluster(
             n_workers=workers if processes else 1,
             threads_per_worker=1 if processes else workers,
             processes=processes,
             host="127.0.0.1" if processes else None,
             memory_limit=None,
-            dashboard_address=f"127.0.0.1:{DASHBOARD}" if dashboard else None,
+            scheduler_kwargs={
+                "dashboard": dashboard,
+                "dashboard_address": f"127.0.0.1:{DASHBOARD if dashboard else 0}",
+            },
             silence_logs=logging.CRITICAL,
         )
         with cluster, Client(cluster) as client:
             yield client
 
 
-def connect(address: str, patience_s: float = CONNECT_S) -> Client:
+def connect(address: str, patience_s: float | None = None) -> Client:
     """A client of the scheduler at this address; NoScheduler if none answers in time."""
-    end = time.monotonic() + patience_s
+    end = time.monotonic() + (CONNECT_S if patience_s is None else patience_s)
     while True:
         left = max(0.1, end - time.monotonic())
         try:
@@ -233,7 +238,7 @@ def collect(
     goes_on: Callable[[], bool],
 ) -> bool:
     """Runs what is to be done as long as goes_on() holds; False if the scheduler went away."""
-    todo, waiting = in_turn(jobs), dict[str, tuple[Job, Task, Future]]()
+    todo, waiting = in_turn(jobs), dict[object, tuple[Job, Task, Future[None]]]()
     running = as_completed(raise_errors=False)
 
     def hand_in() -> None:
@@ -285,7 +290,7 @@ def run(
     return_s: float = RETURN_S,
 ) -> None:
     """Runs all parts that are not done yet; a scheduler that goes away is awaited."""
-    address = client.scheduler.address
+    address = str(client.scheduler_info()["address"])
     own: list[Client] = []
     try:
         while not collect(client, jobs, store, watch, goes_on):

@@ -135,9 +135,11 @@ def firmware_fuzzer(image: str, firmware: Path = FIRMWARE) -> Path:
     """The program of build_firmware_fuzz, built once."""
     files = [FUZZER, *sorted(path for path in Path(firmware).rglob("*") if path.suffix in C_FILES)]
     folder = ROOT / "build" / "fuzz" / f"{image}-{build.digest(files, SANITIZED)}"
-    return build.made_once(
-        folder, "fuzz", lambda making: build_firmware_fuzz(making, image, firmware)
-    )
+
+    def make(making: Path) -> None:
+        build_firmware_fuzz(making, image, firmware)
+
+    return build.made_once(folder, "fuzz", make)
 
 
 def fuzz_firmware(seconds: float, image: str, seed: int = 1, firmware: Path = FIRMWARE) -> Outcome:

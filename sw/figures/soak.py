@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from distributed import Client
 
 from campaigns import runner
-from campaigns.campaign import Campaign, Result
+from campaigns.campaign import Campaign, Result, added
 from campaigns.runner import Failure, Job
 from campaigns.soak import bad_words, failure_words
 from campaigns.store import Store
@@ -20,6 +20,7 @@ from figures.common import Figure, Quick, collected, console
 WORKERS = 2
 SCALE = 0.001
 QUICK = ("ps2", "relay")
+PARTS_IN_SHORT = 2  # of each of these
 
 
 class Killer(runner.Watch):
@@ -57,7 +58,7 @@ def soak_failures(names: Sequence[str] = (), seed: int = 1) -> int:
                 campaign,
                 store,
                 seed,
-                max(2, campaign.parts_of(SCALE)) if names else campaign.parts_of(SCALE),
+                PARTS_IN_SHORT if names else campaign.parts_of(SCALE),
             )
             for name, campaign in known.items()
             if name in (names or known)
@@ -68,10 +69,10 @@ def soak_failures(names: Sequence[str] = (), seed: int = 1) -> int:
         for name, job in jobs.items():
             again = store.results(name, job.version, seed, range(job.parts))
             lost = job.parts - len(again)
-            bad = sum(float(result.counts[job.campaign.failed]) for result in again.values())
-            allowed = job.campaign.allowed > 0  # too few trials to judge a share
+            total = added(job.campaign, again)
+            tried, bad = total[job.campaign.tried], total[job.campaign.failed]
             console.print(f"{name}: {job.parts} parts, {lost} not done, {bad:.0f} failures")
-            failures += lost + (0 if allowed else int(bad))
+            failures += lost + (int(bad) if bad > job.campaign.allowed * tried else 0)
     return failures
 
 
