@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("rtl", "sw", "tables")
+FOLDERS = ("rtl", "sw", "tables", "tb")
 FILES = ("requirements.lock",)
 SKIPPED = ("__pycache__", ".egg-info")
 COMMIT = "MOIRE_COMMIT"

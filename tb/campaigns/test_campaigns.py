@@ -79,7 +79,7 @@ def test_every_campaign_says_what_it_counts_and_has_seeds_enough():
 
 def test_the_version_is_that_of_the_content(tmp_path):
     def folder(name, text):
-        for one in ("rtl", "sw/fuzz", "tables"):
+        for one in ("rtl", "sw/fuzz", "tables", "tb"):
             (tmp_path / name / one).mkdir(parents=True)
         (tmp_path / name / "requirements.lock").write_text("")
         (tmp_path / name / "rtl" / "axis.sv").write_text(text)
