@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
 import dask
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import Client, LocalCluster, as_completed
 from distributed.scheduler import KilledWorker
 
 from campaigns import version
@@ -30,11 +30,9 @@ from moire.errors import MoireError
 CONNECT_S = 10.0
 RETURN_S = 60.0  # for which a scheduler that died may be away
 ENDED_WORKERS = 3  # workers that may die with a part before it counts as not done
-WAITING = 4  # parts that are handed in for each worker ahead of those that run
 DASHBOARD = 8787
 SETTINGS = {
     "distributed.scheduler.allowed-failures": ENDED_WORKERS,
-    "distributed.scheduler.worker-saturation": 1.0,
     "distributed.worker.daemon": True,  # workers end with their client
     "distributed.admin.tick.limit": "1h",  # a part may hold Python's lock for long
     "distributed.comm.timeouts.connect": f"{CONNECT_S:.0f}s",
@@ -238,23 +236,23 @@ def collect(
     goes_on: Callable[[], bool],
 ) -> bool:
     """Runs what is to be done as long as goes_on() holds; False if the scheduler went away."""
-    todo, waiting = in_turn(jobs), dict[object, tuple[Job, Task, Future[None]]]()
+    todo, waiting = in_turn(jobs), dict[object, tuple[Job, Task]]()
     running = as_completed(raise_errors=False)
 
     def hand_in() -> None:
-        if goes_on() and (following := next(todo, None)):
+        """As many parts as the cluster runs at once: only a part that ran is blamed for the death
+        of its worker, and a run that is to stop has none waiting.
+        """
+        room = max(1, sum(client.nthreads().values()))
+        while len(waiting) < room and goes_on() and (following := next(todo, None)):
             job, task = following
             future = client.submit(work, job.campaign, task, store.url, key=task.name, pure=False)
-            waiting[future.key] = job, task, future
+            waiting[future.key] = following
             running.add(future)
 
-    for _ in range(WAITING * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))):
-        hand_in()
-    stopping = False
+    hand_in()
     for future in running:
-        if future.key not in waiting:  # cancelled below
-            continue
-        job, task, _ = waiting.pop(future.key)
+        job, task = waiting.pop(future.key)
         if future.status == "cancelled" or client.status != "running":
             return False
         if future.status == "error":
@@ -272,12 +270,10 @@ def collect(
             job.results[task.part] = result
             watch.done(job, result)
         future.release()
-        hand_in()
-        if not goes_on() and not stopping:
-            stopping = True
-            at_work = {key for keys in client.processing().values() for key in keys}
-            idle = [key for key in waiting if key not in at_work]
-            client.cancel([waiting.pop(key)[2] for key in idle], force=True)
+        try:
+            hand_in()
+        except OSError:  # a connection that is closed
+            return False
     return True
 
 
