@@ -99,6 +99,6 @@ def page(job: Job) -> str:
         [
             (whole(tried), campaign.tried),
             (whole(failed), campaign.failed),
-            (f"< {bound_words(tried, failed)}", f"share, {CONFIDENCE:.0%}"),
+            (f"< {bound_words(tried, failed)}", f"share of failures, {CONFIDENCE:.0%} confidence"),
         ],
     )
