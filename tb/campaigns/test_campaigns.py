@@ -357,14 +357,19 @@ def test_the_compose_file_runs_programs_of_the_lock_file_and_variables_of_make_s
         assert (CLUSTER / service["build"]["context"]).resolve() == ROOT
         assert (ROOT / service["build"]["dockerfile"]).is_file()
     for name in ("scheduler", "worker"):
-        program, kind, *words = services[name]["command"]
+        *program, kind = services[name]["command"][:4]
+        words = [word.partition("=")[0] for word in services[name]["command"][4:]]
         done = subprocess.run(
-            [str(Path(sys.executable).with_name(program)), kind, "--help"],
+            [sys.executable, *program[1:], kind, "--help"],
             capture_output=True,
             text=True,
             check=True,
         )
-        assert kind == name and all(w in done.stdout for w in words if w.startswith("--"))
+        assert (
+            program[0] == "python"
+            and kind == name
+            and all(w in done.stdout for w in words if w.startswith("--"))
+        )
     makefile = (ROOT / "Makefile").read_text()
     assert services["soak"]["command"][:2] == ["make", "soak"]
     names = [word.partition("=")[0] for word in services["soak"]["command"][2:]]

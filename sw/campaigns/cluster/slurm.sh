@@ -18,11 +18,11 @@ make build/venv/stamp firmware
 
 PORT=${PORT:-8786}
 ADDRESS=tcp://$(hostname):$PORT
-DASK=build/venv/bin/dask
+DASK=(build/venv/bin/python -m dask) # modules of the checkout are found
 mkdir -p build/soak
-"$DASK" scheduler --port "$PORT" > build/soak/scheduler.log 2>&1 &
+"${DASK[@]}" scheduler --port "$PORT" > build/soak/scheduler.log 2>&1 &
 scheduler=$!
-srun "$DASK" worker "$ADDRESS" --nthreads 1 --no-dashboard --memory-limit 0 --death-timeout 300 \
+srun "${DASK[@]}" worker "$ADDRESS" --nthreads 1 --no-dashboard --memory-limit 0 --death-timeout 300 \
     > build/soak/workers.log 2>&1 &
 workers=$!
 trap 'kill "$workers" "$scheduler" 2> /dev/null || true; wait' EXIT
