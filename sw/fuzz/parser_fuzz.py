@@ -41,7 +41,9 @@ from moire.made.bus_tables import OPERATIONS, PARAMETERS, PROTOCOL_CRC
 
 PACKAGE = str(Path(moire.__file__).parent)
 LONGEST = 600
-HANG_S = 10
+HANG_S = 10  # of processor time: other programs may keep this one from running
+BLOCKED_S = 600  # of any time
+TIMERS = {signal.SIGPROF: signal.ITIMER_PROF, signal.SIGALRM: signal.ITIMER_REAL}
 
 Parser = Callable[[bytes], object]
 Line = tuple[CodeType, int]
@@ -302,7 +304,8 @@ def attempt(target: Target, data: bytes) -> bool:
     """Runs one input; returns whether it reached anything new."""
     where: str | None = None
     pairs, began = Pairs(), time.perf_counter()
-    signal.setitimer(signal.ITIMER_REAL, HANG_S)
+    for timer, seconds in zip(TIMERS.values(), (HANG_S, BLOCKED_S)):
+        signal.setitimer(timer, seconds)
     sys.settrace(pairs.call)
     try:
         target.parse(data)
@@ -318,7 +321,8 @@ def attempt(target: Target, data: bytes) -> bool:
         where = f"{type(error).__name__} at {file}:{at.tb_lineno}: {error}"
     finally:
         sys.settrace(None)
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        for timer in TIMERS.values():
+            signal.setitimer(timer, 0)
     target.runs, target.seconds = target.runs + 1, target.seconds + time.perf_counter() - began
     if where:
         target.crashes.setdefault(where, data)
@@ -333,7 +337,7 @@ def fuzz(
     """The targets after so many seconds for all of them; with `first` the first crash ends it."""
     draw = random.Random(seed)
     targets = [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers]
-    before = signal.signal(signal.SIGALRM, hang)
+    before = {number: signal.signal(number, hang) for number in TIMERS}
     end, nowhere = time.monotonic() + seconds, io.StringIO()
     try:
         with redirect_stdout(nowhere), redirect_stderr(nowhere):
@@ -351,7 +355,8 @@ def fuzz(
                     nowhere.seek(0)
                     nowhere.truncate()
     finally:
-        signal.signal(signal.SIGALRM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return targets
 
 
