@@ -30,6 +30,12 @@ BEYOND = 40  # terms of a sum that are smaller than e^-40 of its largest one do 
 Counts = Mapping[str, float | str]
 
 
+def seeds(seed: int, count: int) -> range:
+    """Seeds of so many runs: 1, 2, 3 … for the seed 1, and others for every other seed."""
+    first = (seed - 1) * SEEDS_APART + 1
+    return range(first, first + count)
+
+
 @dataclass(frozen=True)
 class Campaign:
     """`what` says in a few words what is tried and how it is judged; it completes "10^9 …".
@@ -63,8 +69,7 @@ class Task:
 
     @property
     def part_seed(self) -> int:
-        """Seeds of a campaign are 1, 2, 3 … for the seed 1, and others for every other seed."""
-        return (self.seed - 1) * SEEDS_APART + 1 + self.part
+        return seeds(self.seed, self.part + 1)[-1]
 
     @property
     def name(self) -> str:

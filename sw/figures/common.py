@@ -18,7 +18,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from campaigns.campaign import SEEDS_APART
+from campaigns.campaign import seeds as seeds
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -93,12 +93,6 @@ class Figure:
         """Whether a measured value is a number, and within the bound of the form that was run."""
         bound = self.quick.bound if quick and self.quick.bound is not None else self.bound
         return math.isfinite(value) and (not bound or within(value, bound))
-
-
-def seeds(seed: int, count: int) -> range:
-    """Seeds of so many runs: 1, 2, 3 … for the seed 1, and others for every other seed."""
-    first = (seed - 1) * SEEDS_APART + 1
-    return range(first, first + count)
 
 
 def shares(total: int, share: int, seed: int) -> Iterator[tuple[int, int]]:
