@@ -303,7 +303,7 @@ def hang(*_: object) -> NoReturn:
 def attempt(target: Target, data: bytes) -> bool:
     """Runs one input; returns whether it reached anything new."""
     where: str | None = None
-    pairs, began = Pairs(), time.perf_counter()
+    pairs, began = Pairs(), time.process_time()
     for timer, seconds in zip(TIMERS.values(), (HANG_S, BLOCKED_S)):
         signal.setitimer(timer, seconds)
     sys.settrace(pairs.call)
@@ -323,7 +323,7 @@ def attempt(target: Target, data: bytes) -> bool:
         sys.settrace(None)
         for timer in TIMERS.values():
             signal.setitimer(timer, 0)
-    target.runs, target.seconds = target.runs + 1, target.seconds + time.perf_counter() - began
+    target.runs, target.seconds = target.runs + 1, target.seconds + time.process_time() - began
     if where:
         target.crashes.setdefault(where, data)
     new = pairs.found - target.seen
@@ -334,17 +334,19 @@ def attempt(target: Target, data: bytes) -> bool:
 def fuzz(
     seconds: float, seed: int = 1, parsers: Sequence[Parser] = tuple(SEEDS), first: bool = False
 ) -> list[Target]:
-    """The targets after so many seconds for all of them; with `first` the first crash ends it."""
+    """The targets after so many seconds of processor time for all of them; with `first` the first
+    crash ends it.
+    """
     draw = random.Random(seed)
     targets = [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers]
     before = {number: signal.signal(number, hang) for number in TIMERS}
-    end, nowhere = time.monotonic() + seconds, io.StringIO()
+    end, nowhere = time.process_time() + seconds, io.StringIO()
     try:
         with redirect_stdout(nowhere), redirect_stderr(nowhere):
             for target in targets:
                 for data in target.corpus:
                     attempt(target, data)
-            while time.monotonic() < end and not (
+            while time.process_time() < end and not (
                 first and any(target.crashes for target in targets)
             ):
                 target = min(targets, key=lambda target: target.seconds)  # each has the same time
