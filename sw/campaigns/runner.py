@@ -173,8 +173,13 @@ def local(workers: int, processes: bool = True, dashboard: bool = False) -> Iter
             },
             silence_logs=logging.CRITICAL,
         )
-        with cluster, Client(cluster) as client:
+        client = Client(cluster)
+        try:
             yield client
+        finally:
+            close(client)
+            with suppress(TimeoutError):  # a worker that is slow to end: the results are written
+                cluster.close()
 
 
 def connect(address: str, patience_s: float | None = None) -> Client:
