@@ -101,8 +101,12 @@ quick: $(SETUP) $(FIRMWARE)    ## every figure in its short form
 figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page; QUICK=1 in their short forms
 	@$(PYTHON) -m figures.figure --all $(FORM)
 
-soak: $(SETUP) $(FIRMWARE)     ## the long campaigns, for a night: K=name of one
-	@$(PYTHON) -m figures.soak $K
+SOAK = $(if $(LIST),--list) $(if $(SCHEDULER),--scheduler '$(SCHEDULER)') $(if $(RESULTS),--results '$(RESULTS)') \
+       $(if $(WORKERS),--workers $(WORKERS)) $(if $(SEED),--seed $(SEED)) $(if $(SCALE),--scale $(SCALE)) \
+       $(if $(MINUTES),--minutes $(MINUTES)) $(if $(PART),--part $(PART))
+
+soak: $(SETUP) $(FIRMWARE)     ## the long campaigns: K=names, SCHEDULER=tcp://… of a cluster, RESULTS=url; docs/campaigns.md
+	@$(PYTHON) -m campaigns.soak $K $(SOAK)
 
 BOARDS := $(patsubst constraints/%/board.mk,%,$(wildcard constraints/*/board.mk))
 

@@ -13,6 +13,7 @@ import xml.etree.ElementTree
 from collections.abc import Mapping
 from pathlib import Path
 
+from campaigns.campaign import Campaign, Counts
 from figures.common import Figure, Quick, console
 from figures.synthesis import SynthesisError
 from twin.build import ROOT, SHORT_RUNS
@@ -164,9 +165,29 @@ FIGURES = {
 }
 
 
-def soak() -> tuple[float, bool]:
-    total = netlist_failures() + power_up_failures() + builds_differing()
-    return total, total == 0
+DIRECTORIES = sorted(path.name for path in (ROOT / "rtl").iterdir() if path.is_dir())
+NODE = "tb/twin/test_twin.py"
+RUNS: list[tuple[str, dict[str, str]]] = [  # tests and their environment; a seed makes POWER_UP
+    *((f"tb/{name}", {"NETLIST": family}) for family in FAMILIES for name in DIRECTORIES),
+    (NODE, {"NETLIST": "ecp5"}),
+    *((f"tb/{name}", {"POWER_UP": ""}) for name in DIRECTORIES),
+]
 
 
-SOAK = {"netlist": soak}
+def tests_of_part(part: int, seed: int) -> Counts:
+    tests, environment = RUNS[part]
+    chosen = {name: value or str(seed) for name, value in environment.items()}
+    ran, wrong = failed(tests, "", chosen)
+    return {"tests": ran, "failed": wrong}
+
+
+CAMPAIGNS = {
+    "netlist": Campaign(
+        "tests of the blocks of each directory on the netlists for ECP5 and iCE40, those of a node "
+        "on its netlist, and those of the blocks from random states; failed: tests",
+        tests_of_part,
+        parts=len(RUNS),
+        tried="tests",
+        failed="failed",
+    )
+}
