@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The mutants of port connections, and block diagrams that contain all of them.
+
+A connection is tied to 0, tied to 1, inverted, or swapped with the next connection of the same
+direction and width of its instance. All mutants of a build are in one design: each connection
+passes through an expression that depends on the variables of the package `wiring_mutant`, which
+select one mutant at run time. Without one the design is the original.
+"""
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutation.connections import RTL, Connection, of_diagram
+
+KINDS = ("tied to 0", "tied to 1", "inverted")
+SWAPPED = "swapped with"
+PACKAGE = """package wiring_mutant;
+    int connection /*verilator public_flat_rw*/;
+    int kind /*verilator public_flat_rw*/;
+    int swap /*verilator public_flat_rw*/;
+endpackage
+"""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One fault of the wiring, and the values that select it."""
+
+    connection: Connection
+    what: str  # one of KINDS, or with what it is swapped
+    selected: tuple[int, int, int]  # connection, kind, swap
+
+    @property
+    def name(self) -> str:
+        """Its name in lists and in wiring.toml."""
+        return f"{self.connection.name} {self.what}"
+
+    @property
+    def place(self) -> str:
+        """Where it is, as an editor wants it."""
+        return f"rtl/{self.connection.file.relative_to(RTL)}:{self.connection.line}"
+
+
+def pairs(connections: Sequence[Connection]) -> list[tuple[Connection, Connection]]:
+    """Neighbours that can be swapped: of the same instance, direction and width. Each connection is
+    in one pair with the next one, if there is one.
+    """
+    groups: dict[tuple[Path, str, bool, str], list[Connection]] = defaultdict(list)
+    for c in connections:
+        groups[c.file, c.instance, c.output, c.width].append(c)
+    return [pair for group in groups.values() for pair in zip(group, group[1:])]
+
+
+@dataclass
+class Design:
+    """The mutants of some diagrams, by the numbers that select them."""
+
+    connections: list[Connection]
+
+    def __post_init__(self) -> None:
+        self.number = {c: n for n, c in enumerate(self.connections, 1)}
+        self.pairs = pairs(self.connections)
+
+    @classmethod
+    def of(cls, files: Iterable[Path], clocks: bool = False) -> "Design":
+        """The mutants of diagrams: of their clocks, or of all but their clocks."""
+        found = [c for file in files for c in of_diagram(file)]
+        return cls([c for c in found if (c.port == "clk") == clocks])
+
+    def mutants(self) -> list[Mutant]:
+        """All mutants."""
+        found = [
+            Mutant(c, what, (n, kind, 0))
+            for c, n in self.number.items()
+            for kind, what in enumerate(KINDS)
+        ]
+        for n, (one, other) in enumerate(self.pairs, 1):
+            found.append(Mutant(one, f"{SWAPPED} {other.port}", (0, 0, n)))
+        return sorted(found, key=lambda m: self.number[m.connection])
+
+    def expression(self, c: Connection, value: str, values: dict[Connection, str]) -> str:
+        """What a connection becomes, with the values of all."""
+        text = (
+            f"(wiring_mutant::connection == {self.number[c]} ? (wiring_mutant::kind == 0 ? '0 : "
+            f"wiring_mutant::kind == 1 ? '1 : ~({value})) : "
+        )
+        for n, pair in enumerate(self.pairs, 1):
+            if c in pair:
+                other = pair[1 - pair.index(c)]
+                text += f"wiring_mutant::swap == {n} ? ({values[other]}) : "
+        return f"{text}({value}))"
+
+    def text(self, file: Path) -> str:
+        """A diagram with its mutants."""
+        source, edits = file.read_bytes(), []
+        own = [c for c in self.connections if c.file == file]
+        values = {c: f"wiring_{self.number[c]}" if c.output else c.expression for c in own}
+        for c in own:
+            if c.output:
+                name, (start, end) = values[c], c.around
+                edits.append((c.start, c.end, f".{c.port}({name})"))
+                edits.append((start, start, f"wire [$bits({c.expression})-1:0] {name};\n"))
+                changed = self.expression(c, name, values)
+                edits.append((end, end, f"\nassign {c.expression} = {changed};"))
+            else:
+                edits.append((c.start, c.end, f".{c.port}({self.expression(c, values[c], values)})"))
+        for start, end, text in sorted(edits, key=lambda e: (e[0], e[1]), reverse=True):
+            source = source[:start] + text.encode() + source[end:]
+        return source.decode()
+
+    def write(self, folder: Path) -> list[Path]:
+        """The package and the diagrams with their mutants, in the order in which they are read."""
+        files = [folder / "wiring_mutant.sv"]
+        files[0].write_text(PACKAGE)
+        for file in sorted({c.file for c in self.connections}):
+            files.append(folder / file.name)
+            files[-1].write_text(self.text(file))
+        return files
+
+
+def without_position(name: str) -> str:
+    """The name of a mutant in wiring.toml, with single spaces."""
+    return re.sub(r"\s+", " ", name)
