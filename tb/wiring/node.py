@@ -1,23 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """A node with everything that can be built, in a bench: registers by name, pins by name.
 
-Its two axes differ: axis 0 has an interpolation chain of its own and a queue of captures, axis 1
-shares the chain of the node and captures the index alone.
+Its axes differ: axis 0 has an interpolation chain of its own and a queue of captures, axis 1 uses
+the chain that axes can share, and captures the index alone. Axis 2 only counts, without a drive.
 """
 
-from moire.bus.protocol import NINTH, TO_NODE, command_byte, frame
+from moire.bus.protocol import NINTH, TO_NODE, command_byte, frame, sync_words
 from moire.made.registers import FIELDS
 from mutation.library import PROGRAM, Bench, library
 
-CLK_HZ = 5_000_000
-TICK = 1250  # cycles, 4000 Hz
+CLK_HZ = 6_200_000  # for three axes with filters
+TICK = 1550  # cycles, 4000 Hz
 COUNT = 1 << 14  # of a position, in 2^-16 period
 PARAMETERS = {
-    "AXES": 2,
+    "AXES": 3,
     "CLK_HZ": CLK_HZ,
     "SEGMENTS": 255,
+    "HAS_SEGMENTS": 3,
+    "HAS_SINE": 3,
     "HAS_OWN_CHAIN": 1,
     "HAS_CAPTURE": 1,
+    "HAS_COMPARE": 3,
+    "HAS_ENCODER_CHECK": 3,
+    "HAS_VELOCITY": 3,
+    "HAS_DRIVE": 3,
     "HAS_I2C": 1,
     "HAS_PS2": 1,
     "HAS_PEER": 1,
@@ -30,7 +36,7 @@ PARAMETERS = {
 TOP = "node"
 IDLE = dict(
     rs485_rx=1,
-    drive_fault_n=3,
+    drive_fault_n=7,
     peer_rx=1,
     sensor_rx=1,
     i2c_scl=1,
@@ -111,7 +117,7 @@ class Node(Bench):
         self.set_bit(pin, bit, idle)
         self.run(cycles)
 
-    def pins(self, *names):
+    def levels(self, *names):
         """Levels of some pins."""
         return tuple(self.get(name) for name in names)
 
@@ -138,6 +144,15 @@ class Node(Bench):
         words = [first | NINTH, *frame(first, body)]
         words[-1] ^= spoil
         self.send_words(words)
+
+    def send_sync(self):
+        """The sync pulse of the bus."""
+        self.send_words(sync_words(1))
+
+    def watch_words(self, *pins):
+        """Watch the pins of a serial output from their levels now on."""
+        self.last = {name: self.get(name) for name in pins}
+        self.watch(*pins)
 
     def characters(self, pin, changes, bit=BIT, bits=10, idle=1):
         """The characters, without start and stop bits, in the changes of a serial output."""

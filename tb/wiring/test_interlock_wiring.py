@@ -7,7 +7,7 @@ import pytest
 
 from tb.wiring.node import COUNT, TICK
 
-LIMIT = 520  # cycles that a limit switch must be stable, and a few more
+LIMIT = 640  # cycles that a limit switch must be stable, and a few more
 WATCHDOG = 1_300_000  # cycles after the last heartbeat at which the soft core counts as stopped
 
 

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which connections of the block diagrams could be cut, inverted or swapped without a test that
+fails.
+
+python -m mutation.wiring [FILE …]      the mutants of these diagrams, or of all
+    --changed      only connections that differ from the last commit on main
+    --list         print the mutants and do not run anything
+    --clocks       the mutants of the clocks only
+
+Each design of DESIGNS has tests in tb/wiring, which run on a build that contains all mutants of one
+diagram. A survivor is an error unless wiring.toml has its reason; a reason for a mutant that does
+not exist any more, or that a test finds, is an error as well.
+"""
+
+import argparse
+import fnmatch
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from mutation.connections import ROOT, RTL, Connection, diagrams, of_diagram
+from mutation.library import library
+from mutation.mutants import Design, Mutant
+
+REASONS = Path(__file__).with_name("wiring.toml")
+RELAY = ("relay.sv", "relay_bridge.sv")  # the diagrams of the relay; the others are in a node
+ZERO = re.compile(r"(\d*'[bdh]?0+|0)")
+ONE = re.compile(r"(1'b1|1'd1)")
+
+
+def design_of(file: Path) -> str:
+    """The design in which a diagram is tested."""
+    return "relay" if file.name in RELAY else "node"
+
+
+@cache
+def reasons() -> dict[str, str]:
+    """{pattern of names of mutants: why no test can find them}."""
+    found: dict[str, str] = tomllib.loads(REASONS.read_text())
+    return found
+
+
+def constant(mutant: Mutant) -> bool:
+    """Whether the connection already is the constant that it is tied to."""
+    rule = {"tied to 0": ZERO, "tied to 1": ONE}.get(mutant.what)
+    return bool(rule and rule.fullmatch(mutant.connection.expression))
+
+
+@dataclass
+class Verdicts:
+    """What became of the mutants."""
+
+    killed: dict[str, str] = field(default_factory=dict)  # name: test
+    survivors: list[Mutant] = field(default_factory=list)
+    explained: dict[str, str] = field(default_factory=dict)  # name: pattern of its reason
+    stale: list[str] = field(default_factory=list)  # patterns that explain what a test finds
+
+    @property
+    def failures(self) -> int:
+        return len(self.survivors) + len(self.stale)
+
+
+def pattern_of(name: str) -> str | None:
+    """The pattern in wiring.toml that fits the name of a mutant."""
+    return next((p for p in reasons() if fnmatch.fnmatchcase(name, p)), None)
+
+
+def base() -> str:
+    """The commit with which the working tree is compared: where it left main, or the last one."""
+    for command in (("merge-base", "HEAD", "main"), ("rev-parse", "HEAD")):
+        found = subprocess.run(["git", *command], cwd=ROOT, capture_output=True, text=True)
+        if found.returncode == 0:
+            return found.stdout.strip()
+    return "HEAD"
+
+
+def key(connection: Connection) -> tuple[str, str, str]:
+    """What makes a connection the same in two versions of a file."""
+    expression = re.sub(r"\s+", "", connection.expression)
+    return connection.instance, connection.port, expression
+
+
+def changed(folder: Path) -> list[Connection]:
+    """The connections that differ from the base; the old diagrams are written into a folder."""
+    found = []
+    for file in diagrams():
+        name = file.relative_to(ROOT)
+        old = subprocess.run(["git", "show", f"{base()}:{name}"], cwd=ROOT, capture_output=True)
+        if old.returncode == 0 and old.stdout == file.read_bytes():
+            continue
+        before = set()
+        if old.returncode == 0:
+            (folder / file.name).write_bytes(old.stdout)
+            before = {key(c) for c in of_diagram(folder / file.name)}
+        found += [c for c in of_diagram(file) if key(c) not in before]
+    return found
+
+
+def campaign(
+    design: Design, mutants: Sequence[Mutant], top: str, jobs: int
+) -> Iterator[tuple[Mutant, str]]:
+    """Each mutant, and the test that finds it."""
+    parameters = subprocess.run(
+        [sys.executable, "-m", "tb.wiring.parameters", top],
+        *(),
+        cwd=ROOT, check=True, capture_output=True, text=True,
+    ).stdout
+    values: Mapping[str, int] = tomllib.loads(parameters)
+    path = library(top, values, design)
+    by_name = {m.name: m for m in mutants}
+    lines = [
+        f"{m.name};{';'.join(map(str, m.selected))};{m.connection.instance}\n" for m in mutants
+    ]
+    command = [sys.executable, "-m", "tb.wiring.campaign", top, str(path), str(jobs)]
+    with subprocess.Popen(
+        command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin and process.stdout
+        process.stdin.writelines(lines)
+        process.stdin.close()
+        for line in process.stdout:
+            name, test = line.rstrip("\n").rsplit(";", 1)
+            yield by_name[name], test
+    if process.returncode:
+        raise RuntimeError(f"the campaign of {top} ended with {process.returncode}")
+
+
+def judge(verdicts: Verdicts, mutant: Mutant, test: str) -> None:
+    """Add the result of one mutant."""
+    pattern = pattern_of(mutant.name)
+    if test:
+        verdicts.killed[mutant.name] = test
+        if pattern:
+            verdicts.stale.append(f"{mutant.name}: {test} finds it, but it has a reason")
+    elif pattern:
+        verdicts.explained[mutant.name] = pattern
+    else:
+        verdicts.survivors.append(mutant)
+
+
+def run(
+    files: Iterable[Path],
+    only: Iterable[Connection] | None = None,
+    clocks: bool = False,
+    jobs: int = 2,
+    report: bool = True,
+) -> Verdicts:
+    """Run the mutants of diagrams, one diagram after the other."""
+    verdicts, chosen = Verdicts(), None if only is None else set(only)
+    for file in files:
+        design = Design.of([file], clocks)
+        mutants = [m for m in design.mutants() if not constant(m)]
+        mutants = [m for m in mutants if chosen is None or m.connection in chosen]
+        if not mutants:
+            continue
+        for mutant, test in campaign(design, mutants, design_of(file), jobs):
+            judge(verdicts, mutant, test)
+            if report and not test and not pattern_of(mutant.name):
+                print(f"{mutant.place}: {mutant.name}: no test sees it", flush=True)
+    return verdicts
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m mutation.wiring")
+    parser.add_argument("files", nargs="*", help="diagrams; default: all")
+    parser.add_argument("--list", action="store_true")
+    parser.add_argument("--clocks", action="store_true")
+    parser.add_argument("-j", type=int, default=2, metavar="JOBS")
+    parser.add_argument("-k", default="", metavar="PART", help="only mutants with this in the name")
+    options = parser.parse_args(arguments)
+    files = [RTL / name for name in options.files] or list(diagrams())
+    if options.list:
+        for mutant in Design.of(files, options.clocks).mutants():
+            print(f"{mutant.place}: {mutant.name}")
+        return 0
+    only = [c for file in files for c in of_diagram(file) if options.k in c.name]
+    verdicts = run(files, only, options.clocks, options.j)
+    print(
+        f"{len(verdicts.killed)} found, {len(verdicts.explained)} explained, "
+        f"{len(verdicts.survivors)} survivors, {len(verdicts.stale)} stale reasons"
+    )
+    for line in verdicts.stale:
+        print(line)
+    return int(verdicts.failures > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
