@@ -58,7 +58,7 @@ class Node(Bench):
 
     def __init__(self, path=None, mutant=(0, 0, 0)):
         super().__init__(path or library(TOP, PARAMETERS), mutant)
-        self.counts = [0, 0]
+        self.counts = [0, 0, 0]
         self.load(PROGRAM)
         self.set(rst=1, address=5, **IDLE)
         self.run(16)
@@ -181,6 +181,7 @@ class Node(Bench):
         self.write("node.tick_period", TICK)
         self.write("node.sample_period", 40)
         self.write("bus.watchdog_time", 0)
+        self.write("axis.sensing", deglitch=2, axis=2)
         for axis in (0, 1):
             self.write("axis.sensing", deglitch=2, axis=axis)
             self.write("axis.disagreement_limit", 0, axis=axis)
