@@ -29,14 +29,20 @@ from mutation.library import library
 from mutation.mutants import Design, Mutant
 
 REASONS = Path(__file__).with_name("wiring.toml")
-RELAY = ("relay.sv", "relay_bridge.sv")  # the diagrams of the relay; the others are in a node
+DESIGNS = {  # diagrams of a design; all others are in the node
+    "relay": ("relay.sv", "relay_bridge.sv"),
+    "peripherals": (
+        *("peripherals.sv", "i2c_port.sv", "ps2_port.sv", "ps2_pass.sv", "peer_port.sv"),
+        *("angle_sensor_port.sv", "display_port.sv"),
+    ),
+}
 ZERO = re.compile(r"(\d*'[bdh]?0+|0)")
 ONE = re.compile(r"(1'b1|1'd1)")
 
 
 def design_of(file: Path) -> str:
     """The design in which a diagram is tested."""
-    return "relay" if file.name in RELAY else "node"
+    return next((top for top, names in DESIGNS.items() if file.name in names), "node")
 
 
 @cache

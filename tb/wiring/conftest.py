@@ -4,11 +4,20 @@
 import pytest
 
 from tb.wiring.node import Node
+from tb.wiring.peripherals import Peripherals
 
 
 @pytest.fixture
 def node():
     """A node after its reset."""
     made = Node()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def peripherals():
+    """The peripherals after their reset."""
+    made = Peripherals()
     yield made
     made.close()
