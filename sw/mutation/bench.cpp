@@ -2,7 +2,7 @@
 // A Verilated design whose pins are read and set by name, with a record of the pins' changes; and,
 // for a node, accesses to its registers by the soft core, whose program is a mailbox in its memory.
 // One translation unit with the Verilated code, which verilated_design.h includes:
-// Design, DESIGN_PINS with PIN(name, bits) for each port, NODE_MEMORY if there is one, HAS_ADC if
+// Design, DESIGN_PINS with PIN(name, bits, input) for each port, NODE_MEMORY if there is one, HAS_ADC if
 // there are converters, and MUTANTS if the design has been made with mutants.
 #include <cstdint>
 #include <cstring>
@@ -16,13 +16,14 @@ namespace {
 struct Pin {
     const char* name;
     unsigned bits;
+    bool input;
     uint64_t (*get)(const Design&);
     void (*set)(Design&, uint64_t);
 };
 
 const Pin PINS[] = {
-#define PIN(name, width)                                                   \
-    {#name, width, [](const Design& d) { return uint64_t(d.name); },       \
+#define PIN(name, width, input)                                            \
+    {#name, width, input, [](const Design& d) { return uint64_t(d.name); },       \
      [](Design& d, uint64_t value) { d.name = decltype(d.name + 0)(value); }},
     DESIGN_PINS
 #undef PIN
@@ -43,8 +44,14 @@ struct Change {
     uint64_t value;
 };
 
+std::unique_ptr<VerilatedContext> at_power_up() {  // each flip-flop has a random value
+    auto context = std::make_unique<VerilatedContext>();
+    context->randReset(2), context->randSeed(1);
+    return context;
+}
+
 struct Bench {
-    std::unique_ptr<VerilatedContext> context = std::make_unique<VerilatedContext>();
+    std::unique_ptr<VerilatedContext> context = at_power_up();
     std::unique_ptr<Design> design = std::make_unique<Design>(context.get());
     uint64_t now = 0;
     std::vector<unsigned> watched;
@@ -109,7 +116,8 @@ void* bench_new(int connection, int kind, int swap) {
         return nullptr;
     }
 #endif
-    bench->design->clk = 0;
+    for (const Pin& pin : PINS)
+        if (pin.input) pin.set(*bench->design, 0);
     return bench;
 }
 void bench_delete(Bench* bench) { delete bench; }

@@ -17,9 +17,9 @@ from mutation.mutants import Design
 from twin import build
 
 DRIVER = Path(__file__).with_name("bench.cpp")
-PORT = re.compile(r"VL_(?:IN|OUT|INOUT)(?:8|16|64)?\(&(\w+),(\d+),(\d+)\);")
+PORT = re.compile(r"VL_(IN|OUT)(?:8|16|64)?\(&(\w+),(\d+),(\d+)\);")
 QUIET = ("-Wno-lint", "-Wno-UNOPTFLAT", "-Wno-MULTIDRIVEN", "-Wno-fatal")
-MEMORY_BYTES = 4096
+UNKNOWN = ("--x-initial", "unique")  # a flip-flop without its reset has any value
 MAILBOX = 0x100  # word
 # The program of a node in a bench: each access to a register is a request in the mailbox.
 PROGRAM = (
@@ -52,7 +52,7 @@ def library(
     support = build.runtime(tool, verilator)
 
     def make(folder: Path) -> None:
-        extra: list[object] = [ROOT / "rtl" / "cpu" / "picorv32.vlt", "--no-decoration"]
+        extra: list[object] = [ROOT / "rtl" / "cpu" / "picorv32.vlt", "--no-decoration", *UNKNOWN]
         top_file = next(file for file in rtl if file.stem == top)
         if mutants:
             (folder / "mutated").mkdir()
@@ -69,7 +69,7 @@ def library(
         ]
         build.run(command, f"g++ of the bench of {top}")
 
-    names = sorted(c.name for c in mutants.connections) if mutants else ()
+    names = [(c.name, c in mutants.chosen) for c in mutants.connections] if mutants else ()
     name = build.digest(sources, tool, values, names, build.COMPILE_SOON)
     return build.made_once(ROOT / "build" / "mutation" / f"{top}-{name}", "libbench.so", make)
 
@@ -77,14 +77,17 @@ def library(
 def header(folder: Path, values: Mapping[str, int], mutants: bool) -> str:
     """What bench.cpp includes: the Verilated sources, and the names in them."""
     port_list, root = (folder / "Vdesign.h").read_text(), (folder / "Vdesign___024root.h").read_text()
-    pins = [(name, int(high) - int(low) + 1) for name, high, low in PORT.findall(port_list)]
+    pins = {
+        name: (int(high) - int(low) + 1, int(kind == "IN"))
+        for kind, name, high, low in PORT.findall(port_list)
+    }
     memory = re.findall(r"(\w+u_memory__DOT__memory);", root)
     lines = ["#pragma once", *(f'#include "{p.name}"' for p in sorted(folder.glob("Vdesign*.cpp")))]
     lines += ["using Design = Vdesign;"]
-    lines += ["#define DESIGN_PINS " + " ".join(f"PIN({n}, {w})" for n, w in pins)]
+    lines += ["#define DESIGN_PINS " + " ".join(f"PIN({n}, {w}, {i})" for n, (w, i) in pins.items())]
     if memory:
         lines += [f"#define NODE_MEMORY {memory[0]}"]
-    if "adc_cs_n" in dict(pins):
+    if "adc_cs_n" in pins:
         lines += ["#define HAS_ADC", f"constexpr int AXES = {values.get('AXES', 1)};"]
     if mutants:
         lines += ["#define MUTANTS"]

@@ -7,13 +7,12 @@ passes through an expression that depends on the variables of the package `wirin
 select one mutant at run time. Without one the design is the original.
 """
 
-import re
-from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutation.connections import RTL, Connection, of_diagram
+from mutation.connections import RTL, Connection, leaves, of_diagram, tree
 
 KINDS = ("tied to 0", "tied to 1", "inverted")
 SWAPPED = "swapped with"
@@ -54,31 +53,71 @@ def pairs(connections: Sequence[Connection]) -> list[tuple[Connection, Connectio
     return [pair for group in groups.values() for pair in zip(group, group[1:])]
 
 
+def uses(file: Path) -> Counter[str]:
+    """How often each identifier of a diagram is used, but for the names of ports and parameters
+    before a parenthesis.
+    """
+    tokens, found = list(leaves(tree(file))), Counter[str]()
+    texts = [leaf.get("text", leaf["tag"]) for leaf in tokens]
+    for before, text, after in zip(["", *texts], texts, [*texts[1:], ""]):
+        if not (before == "." and after == "("):
+            found[text] += 1
+    return found
+
+
+def same_faults(connections: Sequence[Connection]) -> dict[Connection, Connection]:
+    """Outputs whose only listener is one input: their faults are those of the input. The net has
+    three uses then, its declaration and its two ends.
+    """
+    count = {file: uses(file) for file in {c.file for c in connections}}
+    listeners = {(c.file, c.expression): c for c in connections if not c.output}
+    return {
+        c: listeners[c.file, c.expression]
+        for c in connections
+        if c.output and (c.file, c.expression) in listeners and count[c.file][c.expression] == 3
+    }
+
+
 @dataclass
 class Design:
-    """The mutants of some diagrams, by the numbers that select them."""
+    """The mutants of some connections, by the numbers that select them. `chosen` are those whose
+    mutants are in the list; the others are there as neighbours.
+    """
 
     connections: list[Connection]
+    chosen: set[Connection]
 
     def __post_init__(self) -> None:
+        everything = pairs(self.connections)
+        self.same = same_faults(self.connections)
+        self.pairs = [pair for pair in everything if self.chosen & set(pair)]
+        needed = self.chosen | {c for pair in self.pairs for c in pair}
+        self.connections = [c for c in self.connections if c in needed]
         self.number = {c: n for n, c in enumerate(self.connections, 1)}
-        self.pairs = pairs(self.connections)
 
     @classmethod
-    def of(cls, files: Iterable[Path], clocks: bool = False) -> "Design":
+    def of(
+        cls,
+        files: Iterable[Path],
+        clocks: bool = False,
+        chosen: Callable[[Connection], bool] = lambda c: True,
+    ) -> "Design":
         """The mutants of diagrams: of their clocks, or of all but their clocks."""
         found = [c for file in files for c in of_diagram(file)]
-        return cls([c for c in found if (c.port == "clk") == clocks])
+        of_kind = [c for c in found if (c.port == "clk") == clocks]
+        return cls(of_kind, {c for c in of_kind if chosen(c)})
 
     def mutants(self) -> list[Mutant]:
-        """All mutants."""
+        """All mutants, each fault once."""
         found = [
             Mutant(c, what, (n, kind, 0))
             for c, n in self.number.items()
             for kind, what in enumerate(KINDS)
+            if c in self.chosen and not (c in self.same and self.same[c] in self.chosen)
         ]
         for n, (one, other) in enumerate(self.pairs, 1):
-            found.append(Mutant(one, f"{SWAPPED} {other.port}", (0, 0, n)))
+            if one.expression != other.expression:
+                found.append(Mutant(one, f"{SWAPPED} {other.port}", (0, 0, n)))
         return sorted(found, key=lambda m: self.number[m.connection])
 
     def expression(self, c: Connection, value: str, values: dict[Connection, str]) -> str:
@@ -119,8 +158,3 @@ class Design:
             files.append(folder / file.name)
             files[-1].write_text(self.text(file))
         return files
-
-
-def without_position(name: str) -> str:
-    """The name of a mutant in wiring.toml, with single spaces."""
-    return re.sub(r"\s+", " ", name)

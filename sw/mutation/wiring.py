@@ -2,10 +2,7 @@
 """Which connections of the block diagrams could be cut, inverted or swapped without a test that
 fails.
 
-python -m mutation.wiring [FILE …]      the mutants of these diagrams, or of all
-    --changed      only connections that differ from the last commit on main
-    --list         print the mutants and do not run anything
-    --clocks       the mutants of the clocks only
+python -m mutation.wiring [FILE …]      the mutants of these diagrams, or of all; see --help
 
 Each design of DESIGNS has tests in tb/wiring, which run on a build that contains all mutants of one
 diagram. A survivor is an error unless wiring.toml has its reason; a reason for a mutant that does
@@ -14,12 +11,13 @@ not exist any more, or that a test finds, is an error as well.
 
 import argparse
 import fnmatch
-import os
 import re
 import subprocess
 import sys
+import tempfile
+import time
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -66,24 +64,39 @@ class Verdicts:
     survivors: list[Mutant] = field(default_factory=list)
     explained: dict[str, str] = field(default_factory=dict)  # name: pattern of its reason
     stale: list[str] = field(default_factory=list)  # patterns that explain what a test finds
+    left: int = 0  # mutants that were not run
 
     @property
     def failures(self) -> int:
         return len(self.survivors) + len(self.stale)
 
+    @property
+    def words(self) -> str:
+        return (
+            f"{len(self.killed)} found, {len(self.explained)} explained, "
+            f"{len(self.survivors)} survivors, {len(self.stale)} stale reasons, {self.left} not run"
+        )
+
 
 def pattern_of(name: str) -> str | None:
-    """The pattern in wiring.toml that fits the name of a mutant."""
+    """The pattern in wiring.toml that fits a mutant."""
     return next((p for p in reasons() if fnmatch.fnmatchcase(name, p)), None)
 
 
-def base() -> str:
-    """The commit with which the working tree is compared: where it left main, or the last one."""
-    for command in (("merge-base", "HEAD", "main"), ("rev-parse", "HEAD")):
-        found = subprocess.run(["git", *command], cwd=ROOT, capture_output=True, text=True)
-        if found.returncode == 0:
-            return found.stdout.strip()
-    return "HEAD"
+def git(*words: str) -> bytes | None:
+    """What git says, None if it fails."""
+    said = subprocess.run(["git", *words], cwd=ROOT, capture_output=True)
+    return said.stdout if said.returncode == 0 else None
+
+
+def base() -> str | None:
+    """The commit with which the diagrams are compared: where the branch left main; on main itself
+    the commit before the last one. None without a history.
+    """
+    head, left = git("rev-parse", "HEAD"), git("merge-base", "HEAD", "main")
+    if left is None or left == head:
+        left = git("rev-parse", "HEAD~1")
+    return left.decode().strip() if left else None
 
 
 def key(connection: Connection) -> tuple[str, str, str]:
@@ -92,19 +105,20 @@ def key(connection: Connection) -> tuple[str, str, str]:
     return connection.instance, connection.port, expression
 
 
-def changed(folder: Path) -> list[Connection]:
-    """The connections that differ from the base; the old diagrams are written into a folder."""
-    found = []
-    for file in diagrams():
-        name = file.relative_to(ROOT)
-        old = subprocess.run(["git", "show", f"{base()}:{name}"], cwd=ROOT, capture_output=True)
-        if old.returncode == 0 and old.stdout == file.read_bytes():
+def changed() -> set[Connection]:
+    """The connections that differ from the base."""
+    found: set[Connection] = set()
+    commit = base()
+    for file in diagrams() if commit else ():
+        old = git("show", f"{commit}:{file.relative_to(ROOT)}")
+        if old == file.read_bytes():
             continue
         before = set()
-        if old.returncode == 0:
-            (folder / file.name).write_bytes(old.stdout)
-            before = {key(c) for c in of_diagram(folder / file.name)}
-        found += [c for c in of_diagram(file) if key(c) not in before]
+        if old is not None:
+            with tempfile.TemporaryDirectory() as folder:
+                (Path(folder) / file.name).write_bytes(old)
+                before = {key(c) for c in of_diagram(Path(folder) / file.name)}
+        found |= {c for c in of_diagram(file) if key(c) not in before}
     return found
 
 
@@ -112,12 +126,9 @@ def campaign(
     design: Design, mutants: Sequence[Mutant], top: str, jobs: int
 ) -> Iterator[tuple[Mutant, str]]:
     """Each mutant, and the test that finds it."""
-    parameters = subprocess.run(
-        [sys.executable, "-m", "tb.wiring.parameters", top],
-        *(),
-        cwd=ROOT, check=True, capture_output=True, text=True,
-    ).stdout
-    values: Mapping[str, int] = tomllib.loads(parameters)
+    words = [sys.executable, "-m", "tb.wiring.parameters", top]
+    said = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True)
+    values: Mapping[str, int] = tomllib.loads(said.stdout)
     path = library(top, values, design)
     by_name = {m.name: m for m in mutants}
     lines = [
@@ -152,47 +163,53 @@ def judge(verdicts: Verdicts, mutant: Mutant, test: str) -> None:
 
 def run(
     files: Iterable[Path],
-    only: Iterable[Connection] | None = None,
+    chosen: Callable[[Connection], bool] = lambda c: True,
     clocks: bool = False,
     jobs: int = 2,
-    report: bool = True,
+    seconds: float = float("inf"),
 ) -> Verdicts:
-    """Run the mutants of diagrams, one diagram after the other."""
-    verdicts, chosen = Verdicts(), None if only is None else set(only)
+    """Run the mutants of diagrams, one diagram after the other; none is begun after so many
+    seconds.
+    """
+    verdicts, end = Verdicts(), time.monotonic() + seconds
     for file in files:
-        design = Design.of([file], clocks)
+        design = Design.of([file], clocks, chosen)
         mutants = [m for m in design.mutants() if not constant(m)]
-        mutants = [m for m in mutants if chosen is None or m.connection in chosen]
-        if not mutants:
+        verdicts.left += len(mutants)
+        if not mutants or time.monotonic() > end:
             continue
         for mutant, test in campaign(design, mutants, design_of(file), jobs):
+            verdicts.left -= 1
             judge(verdicts, mutant, test)
-            if report and not test and not pattern_of(mutant.name):
-                print(f"{mutant.place}: {mutant.name}: no test sees it", flush=True)
+            if not test and not pattern_of(mutant.name):
+                print(f"{mutant.place}: {mutant.name}: no test sees it", file=sys.stderr, flush=True)
+            if time.monotonic() > end:
+                break
     return verdicts
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m mutation.wiring")
-    parser.add_argument("files", nargs="*", help="diagrams; default: all")
-    parser.add_argument("--list", action="store_true")
-    parser.add_argument("--clocks", action="store_true")
+    parser.add_argument("files", nargs="*", help="diagrams below rtl/; default: all")
+    parser.add_argument("--list", action="store_true", help="print the mutants, run nothing")
+    parser.add_argument("--changed", action="store_true", help="connections that are new here")
+    parser.add_argument("--clocks", action="store_true", help="the clocks in place of all others")
     parser.add_argument("-j", type=int, default=2, metavar="JOBS")
-    parser.add_argument("-k", default="", metavar="PART", help="only mutants with this in the name")
+    parser.add_argument("-k", default="", metavar="PART", help="connections with this in the name")
     options = parser.parse_args(arguments)
     files = [RTL / name for name in options.files] or list(diagrams())
+    new = changed() if options.changed else None
+
+    def chosen(connection: Connection) -> bool:
+        return options.k in connection.name and (new is None or connection in new)
+
     if options.list:
-        for mutant in Design.of(files, options.clocks).mutants():
+        for mutant in Design.of(files, options.clocks, chosen).mutants():
             print(f"{mutant.place}: {mutant.name}")
         return 0
-    only = [c for file in files for c in of_diagram(file) if options.k in c.name]
-    verdicts = run(files, only, options.clocks, options.j)
-    print(
-        f"{len(verdicts.killed)} found, {len(verdicts.explained)} explained, "
-        f"{len(verdicts.survivors)} survivors, {len(verdicts.stale)} stale reasons"
-    )
-    for line in verdicts.stale:
-        print(line)
+    verdicts = run(files, chosen, options.clocks, options.j)
+    print(verdicts.words)
+    print(*verdicts.stale, sep="\n", end="")
     return int(verdicts.failures > 0)
 
 

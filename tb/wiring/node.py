@@ -7,7 +7,7 @@ the chain that axes can share, and captures the index alone. Axis 2 only counts,
 
 from moire.bus.protocol import NINTH, TO_NODE, command_byte, frame, sync_words
 from moire.made.registers import FIELDS
-from mutation.library import PROGRAM, Bench, library
+from mutation.library import MAILBOX, PROGRAM, Bench, library
 
 CLK_HZ = 6_200_000  # for three axes with filters
 TICK = 1550  # cycles, 4000 Hz
@@ -59,7 +59,7 @@ class Node(Bench):
     def __init__(self, path=None, mutant=(0, 0, 0)):
         super().__init__(path or library(TOP, PARAMETERS), mutant)
         self.counts = [0, 0, 0]
-        self.load(PROGRAM)
+        self.load([*PROGRAM, *[0] * (MAILBOX + 4 - len(PROGRAM))])
         self.set(rst=1, address=5, **IDLE)
         self.run(16)
         self.set(rst=0)
