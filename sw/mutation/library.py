@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Builds and loads the shared library of a Verilated design, with or without its mutants.
 
-    bench = Bench(library("node", NODE))        the design in reset
-    bench.set(estop_open=1); bench.run(100); bench.get("drive_enable")
+bench = Bench(library("node", NODE))        the design in reset
+bench.set(estop_open=1); bench.run(100); bench.get("drive_enable")
 """
 
 import ctypes
@@ -64,7 +64,14 @@ def library(
         (folder / "verilated_design.h").write_text(header(folder, values, bool(mutants)))
         command = [
             *(tool, *build.COMPILE_SOON, *build.VERILATED, f"-I{folder}"),
-            *(f"-I{verilator / 'include'}", f"-I{verilator / 'include' / 'vltstd'}", "-shared", DRIVER, support, "-pthread"),
+            *(
+                f"-I{verilator / 'include'}",
+                f"-I{verilator / 'include' / 'vltstd'}",
+                "-shared",
+                DRIVER,
+                support,
+                "-pthread",
+            ),
             *("-o", folder / "libbench.so"),
         ]
         build.run(command, f"g++ of the bench of {top}")
@@ -76,7 +83,10 @@ def library(
 
 def header(folder: Path, values: Mapping[str, int], mutants: bool) -> str:
     """What bench.cpp includes: the Verilated sources, and the names in them."""
-    port_list, root = (folder / "Vdesign.h").read_text(), (folder / "Vdesign___024root.h").read_text()
+    port_list, root = (
+        (folder / "Vdesign.h").read_text(),
+        (folder / "Vdesign___024root.h").read_text(),
+    )
     pins = {
         name: (int(high) - int(low) + 1, int(kind == "IN"))
         for kind, name, high, low in PORT.findall(port_list)
@@ -84,7 +94,9 @@ def header(folder: Path, values: Mapping[str, int], mutants: bool) -> str:
     memory = re.findall(r"(\w+u_memory__DOT__memory);", root)
     lines = ["#pragma once", *(f'#include "{p.name}"' for p in sorted(folder.glob("Vdesign*.cpp")))]
     lines += ["using Design = Vdesign;"]
-    lines += ["#define DESIGN_PINS " + " ".join(f"PIN({n}, {w}, {i})" for n, (w, i) in pins.items())]
+    lines += [
+        "#define DESIGN_PINS " + " ".join(f"PIN({n}, {w}, {i})" for n, (w, i) in pins.items())
+    ]
     if memory:
         lines += [f"#define NODE_MEMORY {memory[0]}"]
     if "adc_cs_n" in pins:
@@ -185,7 +197,9 @@ class Bench:
 
     def access(self, address: int, value: int | None = None, cycles: int = 4000) -> int:
         """Read a register by the soft core, or write it."""
-        request = (ctypes.c_uint32 * 3)(1 if value is None else 2, address, (value or 0) & 0xFFFFFFFF)
+        request = (ctypes.c_uint32 * 3)(
+            1 if value is None else 2, address, (value or 0) & 0xFFFFFFFF
+        )
         result = ctypes.c_uint32()
         done = self.lib.bench_access(
             *(self.bench, MAILBOX, request, ctypes.byref(result)), ctypes.c_uint64(cycles)

@@ -7,6 +7,7 @@ passes through an expression that depends on the variables of the package `wirin
 select one mutant at run time. Without one the design is the original.
 """
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -78,6 +79,23 @@ def same_faults(connections: Sequence[Connection]) -> dict[Connection, Connectio
     }
 
 
+def unheard(connections: Sequence[Connection]) -> set[Connection]:
+    """Outputs without a listener, which the diagram itself says: their net is used in a wire
+    `unused...` only, or its name begins so.
+    """
+    found = set()
+    for file in {c.file for c in connections}:
+        count, text = uses(file), file.read_text()
+        said = " ".join(re.findall(r"wire unused\w* = &\{(.*?)\};", text, re.DOTALL))
+        listed = Counter(re.findall(r"[A-Za-z_]\w*(?!\w|\[)", said))
+        for c in connections:
+            if c.file == file and c.output:
+                alone = listed[c.expression] == 1 and count[c.expression] == 3
+                if alone or c.expression.startswith("unused"):
+                    found.add(c)
+    return found
+
+
 @dataclass
 class Design:
     """The mutants of some connections, by the numbers that select them. `chosen` are those whose
@@ -90,6 +108,7 @@ class Design:
     def __post_init__(self) -> None:
         everything = pairs(self.connections)
         self.same = same_faults(self.connections)
+        self.unheard = unheard(self.connections)
         self.pairs = [pair for pair in everything if self.chosen & set(pair)]
         needed = self.chosen | {c for pair in self.pairs for c in pair}
         self.connections = [c for c in self.connections if c in needed]
@@ -113,10 +132,11 @@ class Design:
             Mutant(c, what, (n, kind, 0))
             for c, n in self.number.items()
             for kind, what in enumerate(KINDS)
-            if c in self.chosen and not (c in self.same and self.same[c] in self.chosen)
+            if c in self.chosen - self.unheard
+            and not (c in self.same and self.same[c] in self.chosen)
         ]
         for n, (one, other) in enumerate(self.pairs, 1):
-            if one.expression != other.expression:
+            if one.expression != other.expression and not {one, other} <= self.unheard:
                 found.append(Mutant(one, f"{SWAPPED} {other.port}", (0, 0, n)))
         return sorted(found, key=lambda m: self.number[m.connection])
 
@@ -145,7 +165,9 @@ class Design:
                 changed = self.expression(c, name, values)
                 edits.append((end, end, f"\nassign {c.expression} = {changed};"))
             else:
-                edits.append((c.start, c.end, f".{c.port}({self.expression(c, values[c], values)})"))
+                edits.append(
+                    (c.start, c.end, f".{c.port}({self.expression(c, values[c], values)})")
+                )
         for start, end, text in sorted(edits, key=lambda e: (e[0], e[1]), reverse=True):
             source = source[:start] + text.encode() + source[end:]
         return source.decode()

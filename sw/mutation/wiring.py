@@ -167,6 +167,7 @@ def run(
     clocks: bool = False,
     jobs: int = 2,
     seconds: float = float("inf"),
+    report: bool = False,
 ) -> Verdicts:
     """Run the mutants of diagrams, one diagram after the other; none is begun after so many
     seconds.
@@ -181,8 +182,12 @@ def run(
         for mutant, test in campaign(design, mutants, design_of(file), jobs):
             verdicts.left -= 1
             judge(verdicts, mutant, test)
+            if report:
+                print(f"{mutant.name}: {test or 'NO TEST'}", file=sys.stderr, flush=True)
             if not test and not pattern_of(mutant.name):
-                print(f"{mutant.place}: {mutant.name}: no test sees it", file=sys.stderr, flush=True)
+                print(
+                    f"{mutant.place}: {mutant.name}: no test sees it", file=sys.stderr, flush=True
+                )
             if time.monotonic() > end:
                 break
     return verdicts
@@ -207,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for mutant in Design.of(files, options.clocks, chosen).mutants():
             print(f"{mutant.place}: {mutant.name}")
         return 0
-    verdicts = run(files, chosen, options.clocks, options.j)
+    verdicts = run(files, chosen, options.clocks, options.j, report=True)
     print(verdicts.words)
     print(*verdicts.stale, sep="\n", end="")
     return int(verdicts.failures > 0)

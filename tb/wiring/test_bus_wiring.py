@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The wires of the bus port in a node: characters and frames both ways, CRC, counters, time-outs."""
+"""The wires of the bus port in a node: characters and frames both ways, CRC, counters,
+time-outs.
+"""
 
 import zlib
 
@@ -124,7 +126,7 @@ def test_a_full_queue_drops_words_and_counts_them(node):
     def word(data, ninth):
         node.character("rs485_rx", data, ninth)
 
-    for n in range(64):
+    for _ in range(64):
         word(command_byte(5, FROM_NODE), 1)
         word(command_byte(5, FROM_NODE), 1)
     node.run(40)

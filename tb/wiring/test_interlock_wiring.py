@@ -5,7 +5,7 @@ switches off the drives that it concerns, and is reported by its name and positi
 
 import pytest
 
-from tb.wiring.node import COUNT, TICK
+from tb.wiring.node import COUNT
 
 LIMIT = 640  # cycles that a limit switch must be stable, and a few more
 WATCHDOG = 1_300_000  # cycles after the last heartbeat at which the soft core counts as stopped
@@ -16,7 +16,7 @@ def other(axis):
 
 
 def judge(node, axis, cause, both=False):
-    """The drive of the axis is off by this cause; the other one is not concerned, or off as well."""
+    """The drive of the axis is off by this cause; the other one is on, or off as well."""
     assert not node.get("drive_enable") >> axis & 1
     assert node.bits("axis.faults", axis) == {cause}
     bit = 1 << list(node.fields("axis.faults", axis)).index(cause)
@@ -235,7 +235,7 @@ def test_a_soft_core_that_traps_stops_all_axes(node):
 
 
 def test_the_heartbeat_of_the_soft_core_keeps_the_drives_on(node):
-    """The watchdog of the soft core counts only while a drive is on, and from the last heartbeat."""
+    """The watchdog of the soft core counts while a drive is on, and from the last heartbeat."""
     node.start()
     node.run(150_000)
     node.enable(1)

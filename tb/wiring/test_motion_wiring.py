@@ -243,7 +243,9 @@ def test_a_bridge_drives_by_the_command_of_its_axis(node, axis):
         on = [c for c in changes if c.pin == still and c.value >> axis & 1]
         assert not [c for c in changes if c.pin == moving]
         assert node.get(moving) == 1 << axis and abs(len(off) - 20) <= 1
-        lengths = {b.cycle - a.cycle for a, b in zip(off, [c for c in on if c.cycle > off[0].cycle])}
+        lengths = {
+            b.cycle - a.cycle for a, b in zip(off, [c for c in on if c.cycle > off[0].cycle])
+        }
         assert lengths <= {49, 50, 51}
     node.write("axis.control", 0, axis=axis)
     node.run(8)

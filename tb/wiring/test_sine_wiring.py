@@ -114,7 +114,11 @@ def test_the_correction_of_an_axis_is_loaded_as_a_whole(node, axis):
     expected = math.atan2(corrected[1], corrected[0]) / (2 * math.pi) * PERIOD
     assert abs(node.read("axis.phase", "phase", axis) - expected) < 40
     assert node.read("axis.phase", "phase", other(axis)) in (0, PERIOD - 1)
-    for offset, gain, error in (((0, 0), 0x8000, 0), ((30 * full, 0), 0x10000, 0), ((0, 0), 0x10000, 0x2000)):
+    for offset, gain, error in (
+        ((0, 0), 0x8000, 0),
+        ((30 * full, 0), 0x10000, 0),
+        ((0, 0), 0x10000, 0x2000),
+    ):
         node.write("feedback.correction_offset", sin=offset[0], cos=offset[1], axis=axis)
         node.write("feedback.correction_gain", gain, axis=axis)
         node.write("feedback.correction_quadrature_error", error, axis=axis)
