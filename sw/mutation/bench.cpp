@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A Verilated design whose pins are read and set by name, with a record of the pins' changes; and,
 // for a node, accesses to its registers by the soft core, whose program is a mailbox in its memory.
-// One translation unit with the Verilated code, which verilated_design.h includes:
-// Design, DESIGN_PINS with PIN(name, bits, input) for each port, NODE_MEMORY if there is one, HAS_ADC if
+// One translation unit with the Verilated code, which verilated_design.h includes: Design,
+// DESIGN_PINS with PIN(name, bits, input) for each port, NODE_MEMORY if there is one, HAS_ADC if
 // there are converters, and MUTANTS if the design has been made with mutants.
 #include <cstdint>
 #include <cstring>
@@ -22,8 +22,8 @@ struct Pin {
 };
 
 const Pin PINS[] = {
-#define PIN(name, width, input)                                            \
-    {#name, width, input, [](const Design& d) { return uint64_t(d.name); },       \
+#define PIN(name, width, input)                                             \
+    {#name, width, input, [](const Design& d) { return uint64_t(d.name); }, \
      [](Design& d, uint64_t value) { d.name = decltype(d.name + 0)(value); }},
     DESIGN_PINS
 #undef PIN

@@ -59,7 +59,7 @@ def uses(file: Path) -> Counter[str]:
     before a parenthesis.
     """
     tokens, found = list(leaves(tree(file))), Counter[str]()
-    texts = [leaf.get("text", leaf["tag"]) for leaf in tokens]
+    texts = [str(leaf.get("text", leaf["tag"])) for leaf in tokens]
     for before, text, after in zip(["", *texts], texts, [*texts[1:], ""]):
         if not (before == "." and after == "("):
             found[text] += 1

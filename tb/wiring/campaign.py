@@ -108,7 +108,8 @@ class Campaign:
 
         def worth(test):
             shared = sum(3 / self.rare[word] for word in words & self.words[test])
-            return test not in self.slow, shared + found[test] + 0.01 * self.all_found[test]
+            likely = shared + found[test] + 0.01 * self.all_found[test]
+            return likely / 10 if test in self.slow else likely
 
         return sorted(self.tests, key=worth, reverse=True)
 
