@@ -52,14 +52,15 @@ def library(
     support = build.runtime(tool, verilator)
 
     def make(folder: Path) -> None:
-        extra: list[object] = [ROOT / "rtl" / "cpu" / "picorv32.vlt", "--no-decoration", *UNKNOWN]
+        extra: list[object] = [ROOT / "rtl" / "cpu" / "picorv32.vlt", "--no-decoration"]
+        extra += [*UNKNOWN, *QUIET]
         top_file = next(file for file in rtl if file.stem == top)
         if mutants:
             (folder / "mutated").mkdir()
             files = mutants.write(folder / "mutated")
             found = [file for file in files if file.stem == top]
             top_file = found[0] if found else top_file
-            extra += [*QUIET, *(file for file in files if file != top_file)]
+            extra += [file for file in files if file != top_file]
         build.verilate(folder, verilator, top_file, "Vdesign", values, *extra)
         (folder / "verilated_design.h").write_text(header(folder, values, bool(mutants)))
         command = [

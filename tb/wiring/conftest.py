@@ -5,6 +5,7 @@ import pytest
 
 from tb.wiring.node import Node
 from tb.wiring.peripherals import Peripherals
+from tb.wiring.relay import Relay
 
 
 @pytest.fixture
@@ -19,5 +20,13 @@ def node():
 def peripherals():
     """The peripherals after their reset."""
     made = Peripherals()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def relay():
+    """The relay before its reset."""
+    made = Relay()
     yield made
     made.close()
