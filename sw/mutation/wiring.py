@@ -109,7 +109,9 @@ def changed() -> set[Connection]:
     """The connections that differ from the base."""
     found: set[Connection] = set()
     commit = base()
-    for file in diagrams() if commit else ():
+    if not commit or git("diff", "--quiet", commit, "--", "rtl") is not None:
+        return found
+    for file in diagrams():
         old = git("show", f"{commit}:{file.relative_to(ROOT)}")
         if old == file.read_bytes():
             continue

@@ -46,7 +46,9 @@ def collect(top):
     for file in sorted(Path(__file__).parent.glob("test_*.py")):
         module = import_module(f"tb.wiring.{file.stem}")
         for name, function in vars(module).items():
-            if name.startswith("test_") and top in function.__code__.co_varnames[:1]:
+            if not (name.startswith("test_") and inspect.isfunction(function)):
+                continue
+            if top in function.__code__.co_varnames[:1]:
                 for label, test, arguments in cases(function):
                     found[f"{file.stem}::{label}"] = test, arguments
     return found
