@@ -31,8 +31,9 @@ DESIGNS = {  # diagrams of a design; all others are in the node
     "relay": ("relay.sv", "relay_bridge.sv"),
     "peripherals": (
         *("peripherals.sv", "i2c_port.sv", "ps2_port.sv", "ps2_pass.sv", "peer_port.sv"),
-        *("angle_sensor_port.sv", "display_port.sv"),
+        "angle_sensor_port.sv",
     ),
+    "display_port": ("display_port.sv",),
 }
 ZERO = re.compile(r"(\d*'[bdh]?0+|0)")
 ONE = re.compile(r"(1'b1|1'd1)")

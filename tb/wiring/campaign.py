@@ -22,7 +22,7 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 
-SECONDS = 120  # of computing time that a mutant may take
+SECONDS = 60  # of computing time that a test may take
 SLOW = ("test_the_heartbeat_of_the_soft_core_keeps_the_drives_on",)  # seconds each
 CRASHED = "the simulation ends by itself"
 
@@ -64,7 +64,6 @@ def child(work):
     os.close(reader)
     for stream in (1, 2):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     os.write(writer, work().encode())
     os._exit(0)
 
@@ -78,7 +77,7 @@ class Campaign:
     """The mutants of a design."""
 
     def __init__(self, top, path):
-        bench = getattr(import_module(f"tb.wiring.{top}"), top.capitalize())
+        bench = getattr(import_module(f"tb.wiring.{top}"), top.title().replace("_", ""))
         self.make = lambda mutant: bench(path, mutant)
         self.make((0, 0, 0)).close()
         self.tests = collect(top)
@@ -94,6 +93,9 @@ class Campaign:
     def fails(self, name, mutant):
         """Whether a test fails with this mutant."""
         test, arguments = self.tests[name]
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        end = int(used.ru_utime + used.ru_stime) + SECONDS
+        resource.setrlimit(resource.RLIMIT_CPU, (end, resource.RLIM_INFINITY))
         try:
             design = self.make(mutant)
             test(design, **arguments)

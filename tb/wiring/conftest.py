@@ -3,6 +3,7 @@
 
 import pytest
 
+from tb.wiring.display_port import DisplayPort
 from tb.wiring.node import Node
 from tb.wiring.peripherals import Peripherals
 from tb.wiring.relay import Relay
@@ -28,5 +29,13 @@ def peripherals():
 def relay():
     """The relay before its reset."""
     made = Relay()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def display_port():
+    """The port of the display after its reset."""
+    made = DisplayPort()
     yield made
     made.close()

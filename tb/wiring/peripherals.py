@@ -94,10 +94,12 @@ class Peripherals(Bench):
             self.write("i2c", command=command, **named)
         self.until(lambda: not self.read("i2c_state")["busy"])
         answers = []
-        while (answer := self.read("i2c_answer"))["present"]:
+        for _ in range(200):
+            if not (answer := self.read("i2c_answer"))["present"]:
+                return answers
             answers.append((answer["result"], answer["data"]))
             self.clk(2)
-        return answers
+        raise AssertionError("the queue of results does not become empty")
 
     def send(self, pin, data, stop=1):
         """Characters on a serial input."""

@@ -51,6 +51,26 @@ def test_each_drive_is_switched_on_by_its_own_request(node):
         node.write("axis.control", 0, axis=axis)
 
 
+def test_after_a_reset_all_drives_are_off_until_the_faults_are_reset(node):
+    """The emergency stop counts as pressed during the reset, whatever was before."""
+    for _ in range(2):
+        assert node.get("drive_enable") == 0
+        for axis in (0, 1):
+            assert node.bits("axis.faults", axis) == {"estop"}
+            node.enable(axis)
+            assert node.get("drive_enable") == 0
+            node.write("axis.control", 0, axis=axis)
+        node.start()
+        for axis in (0, 1):
+            node.enable(axis)
+        assert node.get("drive_enable") == 3
+        node.set(rst=1)
+        node.run(8)
+        assert node.get("drive_enable") == 0
+        node.set(rst=0)
+        node.run(40)
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_limit_switch_stops_its_axis_and_its_position_is_latched(node, axis):
     both_on(node)
@@ -69,6 +89,7 @@ def test_a_limit_switch_stops_its_axis_and_its_position_is_latched(node, axis):
         node.run(LIMIT)
         assert node.read("axis.fault_position", axis=axis) == (node.counts[axis] - 2) * COUNT
         assert node.read("axis.causes_now", axis=axis) == 0
+        assert node.bits("axis.faults", axis) == {end}, "it stays until it is reset"
         node.reset_faults(axis)
         assert node.read("axis.faults", "limit_low", axis=axis) == 0
         node.enable(axis)

@@ -189,11 +189,10 @@ def test_bytes_pass_to_and_from_the_peer(peripherals):
     assert peripherals.read("peer_state") == dict(transmit_free=64, sending=0)
     back = [0xA5, 0x7E]
     peripherals.send("peer_rx", back)
-    received = []
-    while (word := peripherals.read("peer_receive"))["present"]:
-        received.append(word["data"])
+    for byte in back:
+        assert peripherals.read("peer_receive") == dict(data=byte, present=1)
         peripherals.clk(2)
-    assert received == back
+    assert peripherals.read("peer_receive")["present"] == 0
     assert peripherals.read("peer_errors") == dict(framing=0, overruns=0)
 
 
