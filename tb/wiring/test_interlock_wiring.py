@@ -5,7 +5,7 @@ switches off the drives that it concerns, and is reported by its name and positi
 
 import pytest
 
-from tb.wiring.node import COUNT
+from tb.wiring.node import COUNT, TICK
 
 LIMIT = 640  # cycles that a limit switch must be stable, and a few more
 WATCHDOG = 1_324_000  # cycles after the last heartbeat at which the soft core counts as stopped
@@ -52,11 +52,11 @@ def test_each_drive_is_switched_on_by_its_own_request(node):
 
 
 def test_after_a_reset_all_drives_are_off_until_the_faults_are_reset(node):
-    """The emergency stop counts as pressed during the reset, whatever was before."""
+    """Emergency stop and drive fault count as present during the reset, whatever was before."""
     for _ in range(2):
         assert node.get("drive_enable") == 0
         for axis in (0, 1):
-            assert node.bits("axis.faults", axis) == {"estop"}
+            assert node.bits("axis.faults", axis) == {"estop", "drive"}
             node.enable(axis)
             assert node.get("drive_enable") == 0
             node.write("axis.control", 0, axis=axis)
@@ -198,6 +198,22 @@ def test_a_following_error_stops_its_axis_in_closed_loop(node, axis):
     node.count(axis, 2)
     node.ticks(3)
     judge(node, axis, "following_error")
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_first_error_after_the_loop_is_closed_does_not_count(node, axis):
+    both_on(node)
+    node.write("axis.following_limit", 3 * COUNT, axis=axis)
+    node.write("axis.strobes", set_target_to_position=1, axis=axis)
+    node.ticks(2)
+    node.count(axis, 5)
+    node.write("node.start_axes", 4)  # a tick begins here
+    node.run(TICK - 300)
+    node.enable(axis, closed_loop=1)
+    node.run(400)  # the next tick has seen the error
+    node.count(axis, -5)
+    node.ticks(3)
+    assert node.get("drive_enable") == 3
 
 
 @pytest.mark.parametrize("axis", [0, 1])
