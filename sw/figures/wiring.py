@@ -58,11 +58,15 @@ def instances() -> list[tuple[Path, str]]:
     ]
 
 
+def verdicts_of(file: Path, instance: str) -> wiring.Verdicts:
+    return wiring.run([file], lambda connection: connection.instance == instance)
+
+
 def faults_of_part(part: int, seed: int) -> Counts:
     """The faults are the same for every seed: the tests draw numbers of their own."""
     counts = {"faults": 0, "survivors": 0, "explained": 0}
     for file, instance in instances()[part::PARTS]:
-        verdicts = wiring.run([file], lambda connection: connection.instance == instance)
+        verdicts = verdicts_of(file, instance)
         counts["faults"] += len(verdicts.killed) + len(verdicts.explained) + verdicts.failures
         counts["survivors"] += verdicts.failures
         counts["explained"] += len(verdicts.explained)
