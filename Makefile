@@ -24,9 +24,9 @@ help:             ## this list
 demo: $(SETUP) $(FIRMWARE)   ## the S0 stage: home it, move it, show where it went
 	@$(PYTHON) -m experiments.s0_stage
 
-test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1
-	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(SEED), with SEED=$(SEED)))
-	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' $(PYTHON) -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder $(if $K,-k '$K') tb
+test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1, NETLIST=ecp5|ice40
+	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(NETLIST), on netlists for $(NETLIST))$(if $(SEED), with SEED=$(SEED)))
+	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' NETLIST='$(NETLIST)' POWER_UP='$(POWER_UP)' $(PYTHON) -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder $(if $K,-k '$K') tb
 
 check: fresh lint promises test prove quick  ## what every change must pass
 	@echo 'check: all passed'
@@ -101,8 +101,12 @@ quick: $(SETUP) $(FIRMWARE)    ## every figure in its short form
 figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page; QUICK=1 in their short forms
 	@$(PYTHON) -m figures.figure --all $(FORM)
 
-soak: $(SETUP) $(FIRMWARE)     ## the long campaigns, for a night: K=name of one
-	@$(PYTHON) -m figures.soak $K
+SOAK = $(if $(LIST),--list) $(if $(SCHEDULER),--scheduler '$(SCHEDULER)') $(if $(RESULTS),--results '$(RESULTS)') \
+       $(if $(WORKERS),--workers $(WORKERS)) $(if $(SEED),--seed $(SEED)) $(if $(SCALE),--scale $(SCALE)) \
+       $(if $(MINUTES),--minutes $(MINUTES)) $(if $(PART),--part $(PART))
+
+soak: $(SETUP) $(FIRMWARE)     ## the long campaigns: K=names, SCHEDULER=tcp://… of a cluster, RESULTS=url; docs/campaigns.md
+	@$(PYTHON) -m campaigns.soak $K $(SOAK)
 
 BOARDS := $(patsubst constraints/%/board.mk,%,$(wildcard constraints/*/board.mk))
 

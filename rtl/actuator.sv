@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// actuator -- the drive path of an axis: from its target and its command to the pins of a bridge, a
-// stepper driver or a DAC, with a fine stage that uses the DAC.
+// actuator -- drive the motor of an axis: turn its target and its command into the pins of a
+// bridge, a stepper driver or a DAC, with a fine stage that uses the DAC.
 //
 // latency  see bridge_pwm, step_generator, spi_dac and fine_stage
 // rate     one command per tick, a tick at least 53 cycles after the one before
 // behaviour  The pins of a drive that is not built are idle.
 // source   S0: DC motor by PWM, piezo on top; S2: stepper; S3: current amplifier behind a DAC of 16
 //          bits
-// model    the models of its blocks; proved in motion by tb/system
+// model    the models of its blocks; tested together by tb/system
 `default_nettype none
 
 module actuator #(

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis -- one machine axis from the pins of its scale to the pins of its motor, behind three
-// register blocks.
+// axis -- control one machine axis, from the pins of its scale to the pins of its motor, behind
+// three register blocks.
 //
-// latency  22 cycles from an ADC word to position, 23 with a segment table; with a shared chain as
-//          in feedback_channel; from position at a tick to command as motion_engine has it, from
-//          target to motor steps one tick
+// latency  22 cycles from an ADC word to position, 23 with a segment table; with a shared chain see
+//          feedback_channel; see motion_engine for the time from a tick to the command; one tick
+//          from a target to its motor steps
 // rate     one sample per `sample_tick`, one command per `tick`
 // behaviour  Each HAS_... parameter builds one feature. What is not built has no logic, its pins
 //          are idle, and the registers of its settings and its state read 0. `built` shows what
@@ -13,7 +13,7 @@
 //          are in its motion_engine.
 // source   S0: interferometer with sine, cosine and comparator outputs, limit switches, DC motor;
 //          S2, S3: A/B/Z scales, stepper, linear motor
-// model    the models of its blocks; proved in motion by tb/system
+// model    the models of its blocks; tested together by tb/system
 `default_nettype none
 
 module axis #(

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// feedback_channel -- the measuring path of an axis: from the pins of a scale to its position.
+// feedback_channel -- measure the position of an axis: from the pins of its scale to position,
+// captures and compare pulses.
 //
 // latency  22 cycles from an ADC word to position with a chain of its own, 23 with a shared one and
 //          1 more for each axis that is served before, 30 at most for eight axes; 5 cycles from the
 //          pins a and b to position in the mode of counts; 1 cycle more each with a segment table
 // rate     one sample per `sample_tick`
 // behaviour  A feature that is not built has no logic, and the registers of its settings and its
-//          state read 0. Without HAS_OWN_CHAIN an interpolation_chain of the node computes the
-//          steps of several axes; the ports chain_... and sample_... connect it. Without
-//          HAS_CAPTURE only the index captures, one at a time, with its position alone: that is
-//          what homing needs. The check of the encoder is the check of counts per revolution, the
-//          count at the last index and the time of the last edge.
+//          state read 0; see sine_channel and position_events for what remains without
+//          HAS_OWN_CHAIN and HAS_CAPTURE. The check of the encoder consists of the check of counts
+//          per revolution, the count at the last index and the time of the last edge.
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
-// model    the models of its blocks; proved in motion by tb/system
+// model    the models of its blocks; tested together by tb/system
 `default_nettype none
 
 module feedback_channel #(
@@ -180,17 +179,13 @@ module feedback_channel #(
     wire        [15:0] tracked_phase;
     wire signed [16:0] tracked_step;
     wire        [31:0] recorded;
-    // position of the scale; its fraction is the phase
-    wire convert, counted, stepped, scale_valid;
-    wire signed [16:0] counted_step, step;
-    wire [15:0] counted_phase, step_phase;
-    wire signed [47:0] scale_position;
+    wire               convert;
     // segment table
     wire segment_in_force, segment_outside, segment_known, shifted;
     wire signed [31:0] shifted_periods;
     wire signed [23:0] segment_error, segment_stored;
     // capture and compare
-    wire index, software, present, overrun, armed, late;
+    wire present, overrun, armed, late;
     wire [ 6:0] captured_sources;
     wire [15:0] captured_age;
     wire [31:0] captured_time, passed;
@@ -264,414 +259,184 @@ module feedback_channel #(
         .fault       (encoder_fault)
     );
 
-    if (HAS_SINE != 0) begin : g_sine
-        wire converted, sampled, phase_valid, too_fast, sample_lost;
-        wire signed [W-1:0] raw_sin, raw_cos, sampled_sin, sampled_cos;
-        wire [15:0] plain_phase;
-
-        dual_adc_reader #(
-            .W    (W),
-            .FRAME(ADC_FRAME)
-        ) u_adc (
-            .clk,
-            .rst,
-            .start  (convert),
-            // pins
-            .sdata_a(adc_sin),
-            .sdata_b(adc_cos),
-            .cs_n   (adc_cs_n),
-            .sclk   (adc_sclk),
-            // sample
-            .valid  (converted),
-            .sin    (raw_sin),
-            .cos    (raw_cos)
-        );
-        if (HAS_OWN_CHAIN != 0) begin : g_own_chain
-            wire own_overrun;  // never: one axis has nothing to wait for
-
-            interpolation_chain #(
-                .AXES         (1),
-                .W            (W),
-                .HAS_HARMONICS(HAS_HARMONICS)
-            ) u_chain (
-                .clk,
-                .rst,
-                // settings
-                .setting  (wdata),
-                .setting_written,
-                .harmonic_enable,
-                .learn,
-                // sample and count
-                .valid    (converted),
-                .sin      (raw_sin),
-                .cos      (raw_cos),
-                .count    (quadrature_count),
-                // filtered sample
-                .sampled,
-                .sampled_sin,
-                .sampled_cos,
-                .rejected (sample_rejected),
-                // phase before the harmonic correction
-                .phase_valid,
-                .plain_phase,
-                // step of the position
-                .done     (tracked),
-                .step     (tracked_step),
-                .phase    (tracked_phase),
-                .overspeed(too_fast),
-                // faults
-                .disagreement,
-                .overrun  (own_overrun),
-                .lost     (sample_lost)
-            );
-            assign {sin, cos, phase} = {sampled_sin, sampled_cos, tracked_phase};
-            assign {chain_setting_written, chain_harmonic_enable, chain_learn} = '0;
-            assign {sample_valid, sample_sin, sample_cos} = '0;
-
-            wire unused = &{
-                1'b0, own_overrun, chain_sampled, chain_sin, chain_cos, chain_rejected,
-                chain_phase_valid, chain_plain_phase, chain_done, chain_step, chain_phase,
-                chain_overspeed, chain_disagreement, chain_lost
-            };
-        end else begin : g_shared_chain
-            assign chain_setting_written = setting_written;
-            assign chain_harmonic_enable = harmonic_enable;
-            assign chain_learn = learn;
-            assign {sample_valid, sample_sin, sample_cos} = {converted, raw_sin, raw_cos};
-            assign {sampled, sampled_sin, sampled_cos} = {chain_sampled, chain_sin, chain_cos};
-            assign sample_rejected = chain_rejected;
-            assign {phase_valid, plain_phase} = {chain_phase_valid, chain_plain_phase};
-            assign {tracked, tracked_step, tracked_phase} = {chain_done, chain_step, chain_phase};
-            assign {too_fast, disagreement} = {chain_overspeed, chain_disagreement};
-            assign sample_lost = chain_lost;
-
-            sample_hold #(
-                .W(W)
-            ) u_hold (
-                .clk,
-                // from the chain
-                .sampled,
-                .sampled_sin,
-                .sampled_cos,
-                .tracked,
-                .tracked_phase,
-                // last values of this axis
-                .sin,
-                .cos,
-                .phase
-            );
-        end
-        assign overspeed = too_fast || sample_lost;
-        if (HAS_MONITOR != 0) begin : g_monitor
-            wire ready;
-
-            signal_monitor #(
-                .W(W)
-            ) u_monitor (
-                .clk,
-                .rst,
-                .clear     (clear_signal_faults),
-                // limits
-                .low       (amplitude_low),
-                .high      (amplitude_high),
-                .clip_level,
-                .tolerance,
-                .jump,
-                .band,
-                .span,
-                .no_noise_samples,
-                .sign_threshold,
-                .offset_limit,
-                .balance_limit,
-                .quadrature_limit,
-                // signals
-                .valid     (sampled),
-                .sin       (sampled_sin),
-                .cos       (sampled_cos),
-                .a         (levels[0]),
-                .b         (levels[1]),
-                .phase_jump(overspeed),
-                .lost_count(disagreement),
-                // faults
-                .amplitude,
-                .ready,
-                .faults    (signal_faults),
-                .first     (first_signal_faults)
-            );
-
-            wire unused = &{1'b0, ready};
-        end else begin : g_no_monitor
-            assign {amplitude, signal_faults, first_signal_faults} = '0;
-
-            wire unused_axis = &{1'b0, amplitude_low, amplitude_high, sampled};
-            wire unused_limits = &{
-                1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
-                offset_limit, balance_limit, quadrature_limit, clear_signal_faults, levels[1:0]
-            };
-        end
-        if (HAS_RECORDER != 0) begin : g_recorder
-            calibration_recorder #(
-                .W(W)
-            ) u_recorder (
-                .clk,
-                .rst,
-                // settings
-                .start  (record),
-                .phases,
-                .decimation,
-                // signals
-                .sampled(converted),
-                .sin    (raw_sin),
-                .cos    (raw_cos),
-                .phase_valid,
-                .phase  (plain_phase),
-                .disturbed,
-                // burst
-                .read   (recorder_read),
-                .word   (recorded),
-                .full,
-                .invalid
-            );
-        end else begin : g_no_recorder
-            assign {recorded, full, invalid} = '0;
-            wire unused_settings = &{1'b0, record, phases, decimation, recorder_read};
-            wire unused_signals = &{1'b0, disturbed, phase_valid, plain_phase};
-        end
-    end else begin : g_no_sine
-        assign {adc_cs_n, adc_sclk} = 2'b11;
-        assign {sin, cos, phase, amplitude} = '0;
-        assign {sample_rejected, overspeed, disagreement, signal_faults, first_signal_faults} = '0;
-        assign {tracked, tracked_step, tracked_phase} = '0;
-        assign {recorded, full, invalid} = '0;
-        assign {chain_setting_written, chain_harmonic_enable, chain_learn} = '0;
-        assign {sample_valid, sample_sin, sample_cos} = '0;
-
-        wire unused_pins = &{1'b0, adc_sin, adc_cos, convert, levels[1:0]};
-        wire unused_axis = &{1'b0, amplitude_low, amplitude_high};
-        wire unused_limits = &{
-            1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
-            offset_limit, balance_limit, quadrature_limit, clear_signal_faults
-        };
-        wire unused_correction = &{1'b0, setting_written, harmonic_enable, learn};
-        wire unused_chain = &{
-            1'b0, chain_sampled, chain_sin, chain_cos, chain_rejected, chain_phase_valid,
-            chain_plain_phase, chain_done, chain_step, chain_phase, chain_overspeed,
-            chain_disagreement, chain_lost
-        };
-        wire unused_recorder = &{1'b0, record, phases, decimation, recorder_read, disturbed};
-    end
-
-    count_to_phase u_counts (
+    sine_channel #(
+        .W            (W),
+        .ADC_FRAME    (ADC_FRAME),
+        .HAS_SINE     (HAS_SINE),
+        .HAS_OWN_CHAIN(HAS_OWN_CHAIN),
+        .HAS_MONITOR  (HAS_MONITOR),
+        .HAS_HARMONICS(HAS_HARMONICS),
+        .HAS_RECORDER (HAS_RECORDER)
+    ) u_sine (
         .clk,
         .rst,
-        // counts
-        .tick        (sample_tick),
-        .count_step  (quadrature_step),
-        .align       (align_written),
-        .align_counts(align),
-        // step
-        .valid       (counted),
-        .step        (counted_step),
-        .phase       (counted_phase)
+        // ADC
+        .convert,
+        .adc_sin,
+        .adc_cos,
+        .adc_cs_n,
+        .adc_sclk,
+        // settings of the chain
+        .wdata,
+        .setting_written,
+        .harmonic_enable,
+        .learn,
+        // settings of the signal monitor
+        .amplitude_low,
+        .amplitude_high,
+        .clip_level,
+        .tolerance,
+        .jump,
+        .no_noise_samples,
+        .span,
+        .band,
+        .offset_limit,
+        .balance_limit,
+        .quadrature_limit,
+        .sign_threshold,
+        .clear_signal_faults,
+        // recorder
+        .decimation,
+        .phases,
+        .record,
+        .recorder_read,
+        .recorded,
+        .full,
+        .invalid,
+        // encoder
+        .levels(levels[1:0]),
+        .quadrature_count,
+        .disturbed,
+        // shared chain
+        .chain_setting_written,
+        .chain_harmonic_enable,
+        .chain_learn,
+        .sample_valid,
+        .sample_sin,
+        .sample_cos,
+        .chain_sampled,
+        .chain_sin,
+        .chain_cos,
+        .chain_rejected,
+        .chain_phase_valid,
+        .chain_plain_phase,
+        .chain_done,
+        .chain_step,
+        .chain_phase,
+        .chain_overspeed,
+        .chain_disagreement,
+        .chain_lost,
+        // signals
+        .sin,
+        .cos,
+        .phase,
+        .amplitude,
+        // events
+        .sample_rejected,
+        .overspeed,
+        .disagreement,
+        .signal_faults,
+        .first_signal_faults,
+        // step of the position
+        .tracked,
+        .tracked_step,
+        .tracked_phase
     );
-    position_source #(
-        .HAS_SINE(HAS_SINE)
-    ) u_source (
+    scale_position #(
+        .HAS_SINE(HAS_SINE),
+        .SEGMENTS(SEGMENTS)
+    ) u_position (
+        .clk,
+        .rst,
+        // source
         .use_counts,
         .sample_tick,
-        // from sine and cosine
+        .by_counts,
+        .convert,
+        // step by sine and cosine
         .tracked,
         .tracked_step,
         .tracked_phase,
-        // from counts
-        .counted,
-        .counted_step,
-        .counted_phase,
-        // selected
-        .by_counts,
-        .convert,
-        .valid(stepped),
-        .step,
-        .phase(step_phase)
-    );
-    unwrap u_position (
-        .clk,
-        .rst,
-        // step
-        .valid   (stepped),
-        .step,
-        .phase   (step_phase),
+        // counts
+        .quadrature_step,
+        .align_written,
+        .align,
+        // shift of the origin
+        .shift,
         .shift_periods,
-        // position of the scale
-        .done    (scale_valid),
-        .position(scale_position)
+        // segment table
+        .segment_enable,
+        .segment_linear,
+        .segments,
+        .segment_origin,
+        .segment_origin_written,
+        .segment_length,
+        .segment_point,
+        .segment_border,
+        .segment_point_written,
+        .segment_read,
+        .segment_read_point,
+        .segment_in_force,
+        .segment_outside,
+        .segment_error,
+        .segment_known,
+        .segment_stored,
+        // position
+        .position_valid,
+        .position,
+        .moved,
+        .moved_by,
+        .moves,
+        .shifted,
+        .shifted_periods,
+        .step_made,
+        .step_down
     );
-    step_events #(
-        .DELAY(SEGMENTS == 0 ? 0 : 1)
-    ) u_steps (
+    position_events #(
+        .CAPTURE_DELAY(CAPTURE_DELAY),
+        .ZEROS        (HAS_SINE == 0 && SEGMENTS == 0 ? 14 : 0),  // counts: quarters of a period
+        .HAS_CAPTURE  (HAS_CAPTURE),
+        .HAS_COMPARE  (HAS_COMPARE)
+    ) u_position_events (
         .clk,
         .rst,
-        .valid   (stepped),
-        .step,
-        .stepped (step_made),
-        .downward(step_down)
-    );
-    if (SEGMENTS != 0) begin : g_segments
-        localparam int INDEX = $clog2(SEGMENTS + 1);
-
-        assign moves = segment_enable != segment_in_force;
-        segment_correction #(
-            .INDEX(INDEX)
-        ) u_segments (
-            .clk,
-            .rst,
-            // settings
-            .enable        (segment_enable),
-            .linear        (segment_linear),
-            .origin_written(segment_origin_written),
-            .origin        (segment_origin),
-            .segment_length,
-            .segments      (segments[INDEX-1:0]),
-            // table
-            .write         (segment_point_written),
-            .point         (segment_border[INDEX-1:0]),
-            .value         (segment_point),
-            .read          (segment_read),
-            .read_point    (segment_read_point[INDEX-1:0]),
-            // position of the scale
-            .valid         (scale_valid),
-            .position      (scale_position),
-            .shift,
-            .shift_periods,
-            // corrected position
-            .done          (position_valid),
-            .corrected     (position),
-            .moved,
-            .moved_by,
-            // state
-            .in_force      (segment_in_force),
-            .outside       (segment_outside),
-            .error         (segment_error),
-            .known         (segment_known),
-            .stored        (segment_stored)
-        );
-        shift_delay u_shift (
-            .clk,
-            .rst,
-            .shift,
-            .shift_periods,
-            .shifted,
-            .shifted_periods
-        );
-    end else begin : g_no_segments
-        assign {position_valid, position} = {scale_valid, scale_position};
-        assign {moved, moved_by} = {shift, shift_periods, 16'd0};
-        assign moves = 1'b0;
-        assign {shifted, shifted_periods} = {shift, shift_periods};
-        assign {segment_in_force, segment_outside, segment_known} = '0;
-        assign {segment_error, segment_stored} = '0;
-
-        wire unused_settings = &{
-            1'b0, segment_enable, segment_linear, segments, segment_origin,
-            segment_origin_written, segment_length
-        };
-        wire unused_table = &{
-            1'b0, segment_point, segment_border, segment_point_written, segment_read,
-            segment_read_point
-        };
-    end
-
-    capture_events #(
-        .DELAY(CAPTURE_DELAY)
-    ) u_capture_events (
-        .clk,
-        .rst,
+        // events
         .by_counts,
         .index_found,
         .capture_now,
         .sync,
-        .index,
-        .software
+        .tick,
+        .probe,
+        // position
+        .now,
+        .position_valid,
+        .position,
+        .shifted,
+        .shifted_periods,
+        // captures
+        .capture_sources,
+        .capture_next,
+        .capture_clear,
+        .present,
+        .captured_sources,
+        .captured_age,
+        .captured_time,
+        .captured_position,
+        .capture_free,
+        .overrun,
+        // compare pulses
+        .compare_start,
+        .compare_step,
+        .compare_count,
+        .pulse_length,
+        .gap_length,
+        .compare_arm,
+        .compare_disarm,
+        .armed,
+        .compare_pulse,
+        .late,
+        .passed
     );
-    if (HAS_CAPTURE != 0) begin : g_capture
-        position_capture #(
-            .ZEROS(HAS_SINE == 0 && SEGMENTS == 0 ? 14 : 0)  // counts are quarters of a period
-        ) u_capture (
-            .clk,
-            .rst,
-            // sources
-            .enabled(capture_sources),
-            .index,
-            .tick,
-            .software,
-            .probe,
-            // position
-            .now,
-            .valid  (position_valid),
-            .position,
-            // queue
-            .pop    (capture_next),
-            .clear  (capture_clear),
-            .present,
-            .captured_sources,
-            .captured_age,
-            .captured_time,
-            .captured_position,
-            .free   (capture_free),
-            .overrun
-        );
-    end else begin : g_no_capture
-        index_capture u_capture (
-            .clk,
-            .rst,
-            // source
-            .enabled(capture_sources[0]),
-            .index,
-            .position,
-            // capture
-            .pop    (capture_next),
-            .clear  (capture_clear),
-            .present,
-            .captured_position,
-            .overrun
-        );
-        assign captured_sources = {6'd0, present};
-        assign {captured_age, captured_time} = '0;
-        assign capture_free = {4'd0, !present};
-
-        wire unused = &{1'b0, capture_sources[6:1], tick, software, probe, now};
-    end
-    if (HAS_COMPARE != 0) begin : g_compare
-        position_compare u_compare (
-            .clk,
-            .rst,
-            // settings
-            .start        (compare_start),
-            .step         (compare_step),
-            .count        (compare_count),
-            .pulse_length,
-            .gap_length,
-            .arm          (compare_arm),
-            .disarm       (compare_disarm),
-            // position
-            .valid        (position_valid),
-            .position,
-            .shift        (shifted),
-            .shift_periods(shifted_periods),
-            // state
-            .armed,
-            .pulse        (compare_pulse),
-            .late,
-            .passed
-        );
-    end else begin : g_no_compare
-        assign {armed, compare_pulse, late, passed} = '0;
-
-        wire unused_settings = &{1'b0, compare_start, compare_step, compare_count};
-        wire unused_pulses = &{
-            1'b0, pulse_length, gap_length, compare_arm, compare_disarm, shifted, shifted_periods
-        };
-    end
 
     feedback_registers #(
         .HAS_MONITOR      (HAS_MONITOR),

@@ -11,7 +11,7 @@
 //            build, with the rule as the message, and so do more axes and filters than
 //            motion_engine can serve in the cycles of a servo tick, CLK_HZ / TICK_HZ.
 // source   S0: one slave computer per axis, many on one bus; here one node may have several axes
-// model    the models of its blocks; proved in motion by tb/system
+// model    the models of its blocks; tested together by tb/system
 `default_nettype none
 
 module node #(
@@ -115,7 +115,6 @@ module node #(
     input  wire  [       1:0] edm_status            // pins, asynchronous
 );
     localparam int LIMIT_PERIOD = CLK_HZ / 80_000;  // cycles
-    localparam [2:0] STEPS = 3'd6;  // kind of result, as in tables/engine_microcode.py
     localparam int SERVO_FILTERS = HAS_FILTERS % (1 << AXES) != 0 ? FILTERS : 0;
 
     // register bus
@@ -124,7 +123,7 @@ module node #(
     wire [15:0] bus_address;
     wire [31:0] wdata, wdata_low, rdata;
     wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata;
-    wire memory_ready, stores, hold, engine_waits;
+    wire memory_ready, stores, hold, engine_waits, core_waits;
     wire [13:0] stored_at;
     wire [31:0] stored_value;
     wire [32*AXES-1:0] axis_rdata, feedback_rdata, actuator_rdata;
@@ -134,6 +133,9 @@ module node #(
     wire [23:0] tick_period;
     wire [15:0] sample_period;
     wire tick, sample_tick, limit_tick, restart_tick;
+    // waiting of the soft core
+    wire wait_time_written, word_received;
+    wire [23:0] wait_time;
     // start of several axes
     wire start_axes_written, sync;
     wire [7:0] start_axes, sync_axes;
@@ -145,6 +147,7 @@ module node #(
     wire result_valid, result_flag, servo_overrun;
     wire [2:0] result_axis, result_kind;
     wire [47:0] result;
+    wire [15:0] cycles;
     // lines of motor steps
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;
@@ -172,7 +175,7 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (memory_ready && !engine_waits),
+            .ready  (memory_ready && !engine_waits && !core_waits),
             .select,
             .write,
             .address(bus_address),
@@ -192,7 +195,7 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (memory_ready && !engine_waits),
+            .ready  (memory_ready && !engine_waits && !core_waits),
             .select,
             .write,
             .address(bus_address),
@@ -280,7 +283,19 @@ module node #(
         // firmware
         .heartbeat_kick,
         .start_axes,
-        .start_axes_written
+        .start_axes_written,
+        .wait_time,
+        .wait_time_written
+    );
+
+    // the soft core waits while it has nothing to do
+    core_wait u_core_wait (
+        .clk,
+        .rst,
+        .start (wait_time_written),
+        .cycles(wait_time),
+        .wake  (word_received),
+        .waits (core_waits)
     );
 
     // time
@@ -328,106 +343,61 @@ module node #(
         .restart_tick
     );
 
-    if (HAS_VELOCITY % (1 << AXES) != 0) begin : g_engine
-        wire ready, setting_write, setting_waits;
-        wire        [ 2:0] setting_axis;
-        wire        [ 6:0] setting_word;
-        wire        [ 1:0] setting_filter;
-        wire signed [63:0] setting;
-        wire [AXES-1:0] gains_changed, push;
-        wire signed [47:0] shift_by;
-        wire               busy;
-        wire        [15:0] cycles;
-
-        engine_bus #(
-            .AXES   (AXES),
-            .FILTERS(SERVO_FILTERS)
-        ) u_bus (
-            .clk,
-            .rst,
-            // register memory
-            .stores,
-            .address  (stored_at),
-            .value    (stored_value),
-            .value_low(wdata_low),
-            .hold,
-            .waits    (engine_waits),
-            // settings
-            .ready,
-            .setting_waits,
-            .setting_write,
-            .setting_axis,
-            .setting_word,
-            .setting_filter,
-            .setting,
-            // requests
-            .gains_changed,
-            .push,
-            .pending,
-            .moves,
-            .moved,
-            .moved_by,
-            .shift_by
-        );
-        motion_engine #(
-            .AXES       (AXES),
-            .FILTERS    (SERVO_FILTERS),
-            .TICK_CYCLES(CLK_HZ / TICK_HZ)
-        ) u_engine (
-            .clk,
-            .rst,
-            .tick,
-            .now                   (now[31:0]),
-            // settings
-            .setting_write,
-            .setting_axis,
-            .setting_word,
-            .setting_filter,
-            .setting,
-            .setting_waits,
-            // the axes
-            .position,
-            .stepped               (step_made),
-            .downward              (step_down),
-            .block_up,
-            .block_down,
-            .closed_loop,
-            // requests
-            .start                 (play),
-            .arm,
-            .controlled_stop,
-            .set_target_to_position(hold_target),
-            .push,
-            .gains_changed,
-            .shift                 (moved),
-            .shift_by,
-            .waits                 (request_waits),
-            // results
-            .result_valid,
-            .result_axis,
-            .result_kind,
-            .result,
-            .result_flag,
-            // schedule
-            .ready,
-            .busy,
-            .overrun               (servo_overrun),
-            .cycles
-        );
-
-        wire unused = &{1'b0, busy, cycles};
-    end else begin : g_no_engine
-        assign {hold, engine_waits, request_waits} = '0;
-        assign {result_valid, result_axis, result_kind, result, result_flag} = '0;
-        assign servo_overrun = 1'b0;
-
-        wire unused_registers = &{1'b0, stores, stored_at, stored_value};
-        wire unused_axes = &{
-            1'b0, position, step_made, step_down, moves, moved, moved_by, block_up, block_down,
-            closed_loop
-        };
-        wire unused_requests = &{1'b0, play, arm, controlled_stop, hold_target, pending};
-    end
+    motion #(
+        .AXES        (AXES),
+        .FILTERS     (SERVO_FILTERS),
+        .TICK_CYCLES (CLK_HZ / TICK_HZ),
+        .HAS_VELOCITY(32'(HAS_VELOCITY % (1 << AXES) != 0)),
+        .HAS_STEPPER (32'(HAS_STEPPER % (1 << AXES) != 0))
+    ) u_motion (
+        .clk,
+        .rst,
+        // time
+        .tick,
+        .tick_period(tick_period[17:0]),
+        .now        (now[31:0]),
+        // register memory
+        .stores,
+        .stored_at,
+        .stored_value,
+        .wdata_low,
+        .hold,
+        .waits      (engine_waits),
+        // the axes
+        .position,
+        .step_made,
+        .step_down,
+        .moves,
+        .moved,
+        .moved_by,
+        .block_up,
+        .block_down,
+        .closed_loop,
+        // requests
+        .play,
+        .arm,
+        .controlled_stop,
+        .hold_target,
+        .request_waits,
+        .pending,
+        // results
+        .result_valid,
+        .result_axis,
+        .result_kind,
+        .result,
+        .result_flag,
+        // schedule
+        .servo_overrun,
+        .cycles,
+        // lines of motor steps
+        .line_start,
+        .line_idle,
+        .rate_valid,
+        .rate,
+        .rate_restart,
+        .rate_steep,
+        .line_stopped
+    );
 
     // interlock
     core_watchdog #(
@@ -466,6 +436,7 @@ module node #(
         .address,
         .armed,
         .watchdog_expired,
+        .word_received,
         .sync,
         .sync_axes,
         // pins
@@ -514,33 +485,6 @@ module node #(
         .display_data,
         .edm_status
     );
-
-    if (HAS_STEPPER % (1 << AXES) != 0) begin : g_lines
-        step_lines #(
-            .AXES(AXES)
-        ) u_lines (
-            .clk,
-            .rst,
-            .period    (tick_period[17:0]),
-            .tick,
-            // targets
-            .valid     (result_valid && result_kind == STEPS),
-            .axis      (result_axis),
-            .target    (result),
-            .restart_in(result_flag),
-            .stopped   (line_stopped),
-            // lines
-            .line_start,
-            .line_idle,
-            .rate_valid,
-            .rate,
-            .rate_restart,
-            .rate_steep
-        );
-    end else begin : g_no_lines
-        assign {line_start, line_idle, rate_valid, rate, rate_restart, rate_steep} = '0;
-        wire unused = &{1'b0, line_stopped};
-    end
 
     if (SHARED != 0) begin : g_chain
         interpolation_chain #(
@@ -711,7 +655,7 @@ module node #(
         );
     end
 
-    wire unused = &{1'b0, bus_address[1:0]};
+    wire unused = &{1'b0, bus_address[1:0], cycles};
 endmodule
 
 `default_nettype wire

@@ -9,7 +9,7 @@
 // source   S4: the main controller is a keyboard of the EDM machine, reads its lamps, has a panel
 //          and an EEPROM on I2C, and speaks to a sub-controller at the peer port; the
 //          sub-controller reads a time-grating sensor. S0: numeric display
-// model    the models of its blocks; proved in motion by tb/peripheral/test_peripherals.py
+// model    the models of its blocks; tested together by tb/peripheral/test_peripherals.py
 `default_nettype none
 
 module peripherals #(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay -- a box between a read head and its controller: A/B/Z in, corrected A/B/Z out, as if it
-// were the encoder.
+// relay -- correct A/B/Z between a read head and its controller: the outputs are those of an
+// encoder without the error.
 //
 // latency  10 cycles from an edge at the input to its edge at the output, with the filter in
 //          bypass; filter_required - 1 cycles more with the filter, whatever K is
@@ -8,7 +8,7 @@
 // behaviour  The output pins follow the input pins until the first edge. The edges are not
 //          corrected until a set is loaded and the index has come: see `correcting`.
 // source   S1: the angle is corrected between the read head and the CNC, neither of which changes
-// model    the models of its blocks; proved in motion by tb/system/test_relay.py
+// model    the models of its blocks; tested together by tb/system/test_relay.py
 //
 // Bits of the flags: 0 illegal edge, 1 the counts between two indexes are wrong, 2 an index is
 // missing, 3 a short pulse was filtered out, 4 the output is more than 4 counts behind, 5 a set of

@@ -5,7 +5,7 @@
 // latency  see the blocks
 // rate     one character each way at a time, 128 in each queue
 // source   S0: one master, many slaves on one pair of wires, the 9th bit marks command bytes
-// model    the models of its blocks; proved in motion by tb/serial/test_rs485_port.py
+// model    the models of its blocks; tested together by tb/serial/test_rs485_port.py
 `default_nettype none
 
 module rs485_port #(
@@ -23,6 +23,7 @@ module rs485_port #(
     input  wire  [ 3:0] address,             // address of the node on the bus
     input  wire         armed,               // level: a drive is on
     output logic        watchdog_expired,    // level: the master has been silent too long
+    output logic        word_received,       // level: a received word has not been read
     output logic        sync,                // strobe: sync pulse of the bus
     output logic [ 7:0] sync_axes,           // bit n: axis n starts with sync
     // pins
@@ -222,6 +223,8 @@ module rs485_port #(
         .transmit_timeouts  (transmit_expired),
         .syncs              (sync)
     );
+
+    assign word_received = receive_present;
 
     wire unused = &{1'b0, receiving, receive_free, transmit_overrun};
 endmodule

@@ -2,7 +2,7 @@
 """Make the constants of arctan_pipelined and arctan_iterative.
 
 rtl/interpolate/arctan_rotation_rom.sv holds the angles by which both modules rotate a vector; the
-widths and counts stand between two marks in each module.
+widths and counts are between two marks in each module.
 
 The longer component of a vector is rotated until it is the amplitude, the shorter one until it is
 zero. Digit i rotates by atan(2^-i) up to i = TURNS. From then on q = shorter / longer is below

@@ -516,7 +516,7 @@ def page_parts(bus: Bus) -> dict[str, list[str]]:
                     parameter["lsb"],
                     *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")),
                     parameter["text"]
-                    + (f"; needs {parameter['needs']}" if "needs" in parameter else ""),
+                    + (f"; needs HAS_{parameter['needs']}" if "needs" in parameter else ""),
                 )
             )
         parts[kind + "s"] = table(

@@ -9,7 +9,7 @@ undivided to a word. Effects and jobs are in the tables below.
 
 The engine works on three lines at once: it fetches one while it reads the operand of the line
 before and adds up the line before that. So what a line changes is known DISTANCE lines later. Where
-the program wants it sooner, the assembler inserts lines that only pass acc on.
+the program needs it sooner, the assembler inserts lines that only pass acc on.
 """
 
 import re
@@ -20,7 +20,7 @@ from pathlib import Path
 
 from tables import made_files
 
-RTL = Path(__file__).resolve().parent.parent / "rtl" / "control"
+RTL = made_files.ROOT / "rtl" / "control"
 MADE = RTL / "engine_microcode.sv"
 MEMORY = RTL / "engine_memory.sv"
 PROOF = RTL / "engine_regions.sv"
@@ -1202,8 +1202,8 @@ def memory_text() -> str:
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
-// engine_memory -- the words of all axes of motion_engine: state, settings, queues, filters and
-// constants.
+// engine_memory -- store the words of all axes of motion_engine: state, settings, queues, filters
+// and constants.
 //
 // latency   1 cycle from read_at to stored, and from write to the new word
 // rate      one word read and one written per cycle, which must not be the same
@@ -1305,7 +1305,8 @@ def regions_text() -> str:
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
-// engine_regions -- what the lines of engine_microcode belong to, for a proof.
+// engine_regions -- report which part of the microcode a line belongs to, for the proof of
+// engine_sequencer.
 //
 // latency   0 cycles, combinational
 // rate      one line per cycle

@@ -102,7 +102,7 @@ def text() -> str:
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
-// engine_words -- which words of the register map are words of motion_engine.
+// engine_words -- translate a word of the register map into the word of motion_engine that it sets.
 //
 // latency   0 cycles, combinational
 // rate      one word per cycle

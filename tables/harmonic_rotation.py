@@ -38,7 +38,7 @@ def text() -> str:
     cases = "\n".join(f"            5'd{n}: angle = 32'd{a};" for n, a in enumerate(most))
     return f"""\
 // SPDX-License-Identifier: Apache-2.0
-// harmonic_rotation_rom -- the angle of each rotation of harmonic_map.
+// harmonic_rotation_rom -- look up the angle of each rotation of harmonic_map.
 //
 // latency   0 cycles: combinational
 // source    Rotation n turns by atan(2^-n), rounded to 2^-{UNIT} turn.

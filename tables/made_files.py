@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every generator of this folder does with the files that it makes: write those that are
-stale, or only tell them.
+stale, or only report them.
 """
 
 import argparse
@@ -57,8 +57,8 @@ def main(
         only.add_argument(
             "--bound", action="store_true", help="print the bound of the error and write nothing"
         )
-    wanted = parser.parse_args(arguments)
-    if figures and wanted.bound:
+    options = parser.parse_args(arguments)
+    if figures and options.bound:
         print(figures())
         return 0
     try:
@@ -68,7 +68,7 @@ def main(
         return 1
     for path, text in found.items():
         name = os.path.relpath(path, ROOT)
-        if wanted.check:
+        if options.check:
             print(f"{name} is stale: run `make tables`", file=sys.stderr)
         elif text is None:
             path.unlink()
@@ -77,7 +77,7 @@ def main(
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8", newline="\n")
             print(f"made {name}")
-    return 1 if wanted.check and found else 0
+    return 1 if options.check and found else 0
 
 
 def systemverilog(text: str) -> str:

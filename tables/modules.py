@@ -74,21 +74,21 @@ def brief(text: str) -> str:
 
 def check_of(path: Path) -> tuple[Path | None, Path | None]:
     """(model, test) of a module as paths from ROOT, derived from its own path."""
-    room, name = path.parent.relative_to(ROOT / "rtl"), path.stem
-    if not room.name:  # axis, node: block diagrams; whole-system tests are theirs
+    folder, name = path.parent.relative_to(ROOT / "rtl"), path.stem
+    if not folder.name:  # axis, node: block diagrams; whole-system tests are theirs
         return None, Path("tb/system")
     if name.endswith("_registers"):
         return Path("tb/registers/register_block.py"), Path("tb/registers/test_registers.py")
     if name.endswith("_rom"):  # a made table: its generator is the model
         user = name.removesuffix("_rom")
-        tests = sorted((ROOT / "tb" / room).glob(f"test_{user}*.py"))
+        tests = sorted((ROOT / "tb" / folder).glob(f"test_{user}*.py"))
         own = [path for path in tests if path.stem == f"test_{name}"]
         return Path("tables") / f"{user}.py", next(
             (path.relative_to(ROOT) for path in own + tests), None
         )
     if name.endswith("_microcode"):  # a made table too, of what its user does
-        return Path("tables") / f"{name}.py", Path("tb") / room / f"test_{name}.py"
-    return Path("tb") / room / f"{name}.py", Path("tb") / room / f"test_{name}.py"
+        return Path("tables") / f"{name}.py", Path("tb") / folder / f"test_{name}.py"
+    return Path("tb") / folder / f"{name}.py", Path("tb") / folder / f"test_{name}.py"
 
 
 def row(path: Path, wrong: list[str]) -> list[str]:
@@ -101,7 +101,7 @@ def row(path: Path, wrong: list[str]) -> list[str]:
         return []
     model, test = check_of(path)
     named = re.search(r"tb/[\w/]+\.\w+", facts.get("model", ""))
-    if facts.get("model", "").startswith("the models of its blocks"):  # wiring in a room
+    if facts.get("model", "").startswith("the models of its blocks"):  # wiring in a folder
         model, test = None, Path(named.group(0)) if named else Path("tb/system")
     elif named and model:
         model = Path(named.group(0))
@@ -127,10 +127,10 @@ def row(path: Path, wrong: list[str]) -> list[str]:
                 f"{here}: `{key}` must begin with a sentence of at most {LONGEST_CELL} characters, "
                 f"it has {len(text)}"
             )
-    room = path.parent.name if path.parent != ROOT / "rtl" else ""
+    folder = path.parent.name if path.parent != ROOT / "rtl" else ""
     place = path.relative_to(ROOT / "rtl").as_posix()
     return [
-        room,
+        folder,
         f"[{path.stem}]({place})",
         purpose,
         latency,

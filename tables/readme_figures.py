@@ -68,7 +68,7 @@ def row(name: str, figure: Figure, entry: Entry | None) -> str:
         measured = "not measured yet"
     else:
         measured = typeset(f"{number(entry.value, figure.digits)} {entry.unit}".strip())
-    return f"| `{name}`: {typeset(figure.what)} | {measured} | {typeset(figure.wanted)} |"
+    return f"| `{name}`: {typeset(figure.what)} | {measured} | {typeset(figure.bound_words)} |"
 
 
 def sources(entries: dict[str, Entry]) -> str:

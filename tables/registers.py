@@ -27,7 +27,8 @@ REGISTER_BUS_BASE = 0x8000_0000  # where the soft core sees the map
 SLOT = 0x100  # bytes that a block may fill: a word index inside it has 6 bits
 EVENTS = ("counter", "sticky")  # kinds whose port is a strobe that the block counts or holds
 Property = Callable[[str], Any]  # of a field, by its name in SystemRDL
-Fitted = tuple[str, str, str, str]  # direction, shape, name, text
+Port = tuple[str, str, str, str]  # direction, shape, name, text
+Fitted = tuple[str, str, str, str, bool]  # and whether the text has lines of its own, above
 KINDS: dict[
     str, Callable[[Property, FieldNode], Any]
 ] = {  # what each kind of a field must be: sw, hw, and a further condition
@@ -498,49 +499,38 @@ def crc(source: Path = SOURCE) -> int:
     return zlib.crc32(source.read_bytes().replace(b"\r\n", b"\n"))
 
 
-def ports(r: Register) -> list[tuple[str, str, str, list[str]]]:
-    """(direction, shape, name, texts from long to short) of each port of a register."""
+def ports(r: Register) -> list[Port]:
+    """Each port of a register."""
     fields = r.fields
-    found: list[tuple[str, str, str, list[str]]] = []
+    found: list[Port] = []
     if r.vector:
-        what = "" if fields[0].kind == "input" else "strobes: "
-        texts = [f"{what}{r.text}", f"{what}{clause(r.text)}"]
-        found.append(("input  wire ", span(len(fields)), r.name, texts))
+        what = "levels: " if fields[0].kind == "input" else "strobes: "
+        found.append(("input  wire ", span(len(fields)), r.name, f"{what}{r.text}"))
         fields = ()
     for f in fields:
         strobe = f.kind == "pulse" or f.kind in EVENTS
-        texts = [f.described, f"{clause(f.meaning)}, {f.measure}" if f.unit else clause(f.meaning)]
-        texts = [f"strobe: {t}" for t in texts] + ["strobe"] if strobe else texts
-        texts += [f.measure, clause(f.meaning)] if f.unit else []
+        text = f"strobe: {f.described}" if strobe else f.described
         out = f.kind in ("setting", "pulse")
         if f.kind != "constant" and not f.passed:
             shape = "" if strobe else f.shape
-            found.append(("output logic" if out else "input  wire ", shape, f.port, texts))
+            found.append(("output logic" if out else "input  wire ", shape, f.port, text))
     strobes = (("written", r.on_write, "new value"), ("read", r.on_read, "read in this cycle"))
     for event, there, text in strobes:
         if there:
-            found.append(("output logic", "", f"{r.name}_{event}", [f"strobe: {text}"]))
+            found.append(("output logic", "", f"{r.name}_{event}", f"strobe: {text}"))
     return found
 
 
-def clause(text: str) -> str:
-    return re.split(r"[;:,.] |\.$| \(", text)[0]
-
-
-def fitted(found: Sequence[tuple[str, str, str, list[str]]]) -> list[Fitted]:
-    """The same ports, each with the longest text that fits its line after the formatter's work."""
+def fitted(found: Sequence[Port]) -> list[Fitted]:
+    """The same ports; a text that does not fit the line of its port after the formatter's work
+    has lines of its own above it.
+    """
     widest = max((len(shape.partition("[")[2]) + 1 for _, shape, _, _ in found), default=0)
     signed = 7 if any(shape.startswith("signed") for _, shape, _, _ in found) else 0
     longest = max((len(name) for _, _, name, _ in found), default=0)
     taken = len("    output logic  ,  // ") + max(widest, 6) + signed + longest
     room = made_files.COLUMNS - taken
-    fit = []
-    for kind, shape, name, texts in found:
-        text = next((t for t in texts if len(t) <= room), None)
-        if text is None:
-            raise Refused(f"{name}: the first clause must have at most {room} characters")
-        fit.append((kind, shape, name, text))
-    return fit
+    return [(*port, len(port[3]) > room) for port in found]
 
 
 def sentence(text: str) -> str:

@@ -7,7 +7,6 @@ import sys
 import textwrap
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 
 from tables import made_files
 from tables.harmonic_rotation import arctan
@@ -16,7 +15,7 @@ PI = round(4 * (4 * arctan(5) - arctan(239)) * (1 << 64))  # 2^-64, by Machin's 
 POINTS = 512  # of a circle
 LARGEST = 32767  # 1.0
 BLOCKS = 256  # of a burst of phases
-MADE = Path(__file__).resolve().parent.parent / "sw" / "firmware" / "made" / "waves.h"
+MADE = made_files.ROOT / "sw" / "firmware" / "made" / "waves.h"
 
 
 @cache

@@ -3,6 +3,8 @@
 
 SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside the results, under
                                             build/)
+NETLIST=ecp5|ice40     the netlist that Yosys makes of the module, in place of its RTL
+POWER_UP=number        Verilator, with flip-flops and memories that start in this random state
 """
 
 import fcntl
@@ -19,7 +21,10 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
+from twin import netlist
+
 ROOT = Path(__file__).resolve().parent.parent
+RANDOM_STATE = ["+verilator+rand+reset+2"]  # what Verilator's X of the power-up becomes: random
 BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself
 WAIVERS = [
     ROOT / "rtl" / "cpu" / "cores.vlt"
@@ -82,8 +87,9 @@ def run(top, test, **parameters):
     under rtl/.
     """
     __tracebackhide__ = True
+    power_up = os.environ.get("POWER_UP")
     sim, waves, here = (
-        os.environ.get("SIM") or "icarus",
+        os.environ.get("SIM") or ("verilator" if power_up else "icarus"),
         bool(os.environ.get("WAVES")),
         Path(test).resolve(),
     )
@@ -95,7 +101,9 @@ def run(top, test, **parameters):
     tag = "-".join([top, *(f"{k}{v}" for k, v in values.items()), *(["waves"] if waves else [])])
     if not re.fullmatch(r"[\w.-]{1,100}", tag):
         tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
-    shared = ROOT / "build" / sim / tag
+    family = os.environ.get("NETLIST")
+    kind = "-".join(filter(None, [sim, family, power_up and "power_up"]))
+    shared = ROOT / "build" / kind / tag
     own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
     own.mkdir(parents=True, exist_ok=True)
     runner, build = (
@@ -108,6 +116,11 @@ def run(top, test, **parameters):
     else:
         sources, args = [w for w in WAIVERS if w.exists()], [*args, "+libext+.sv+.v", "-Wall"]
         direct_verilator(runner)
+    if family:
+        sources, source, args = of_netlist(sim, family, source, parameters)
+    if power_up:
+        assert sim == "verilator", "Icarus has no random states: POWER_UP needs Verilator"
+        args = [*args, "--x-initial", "unique", "--x-assign", "unique"]
     with open(shared / "lock", "w") as lock:  # parallel workers may want the same build
         fcntl.flock(lock, fcntl.LOCK_EX)
         runner.build(
@@ -122,10 +135,11 @@ def run(top, test, **parameters):
         )
     module = ".".join(here.relative_to(ROOT).with_suffix("").parts)
     number = seed()
-    print(f"{top} under {sim}, SEED={number}", flush=True)
-    failed = (
-        f"{top} under {sim}: {{}}. Again: make test K={name.split('[')[0]} SIM={sim} SEED={number}"
-    )
+    what = f"{top} under {sim}" + (f" as a netlist for {family}" if family else "")
+    print(f"{what}, SEED={number}", flush=True)
+    again = f"SIM={sim} SEED={number}" + (f" NETLIST={family}" if family else "")
+    again += f" POWER_UP={power_up}" if power_up else ""
+    failed = f"{what}: {{}}. Again: make test K={name.split('[')[0]} {again}"
     try:
         count, wrong = results(
             runner.test(
@@ -135,6 +149,7 @@ def run(top, test, **parameters):
                 test_dir=own,
                 seed=number,
                 waves=waves,
+                plusargs=RANDOM_STATE + [f"+verilator+seed+{power_up}"] if power_up else [],
             )
         )
     except (
@@ -150,6 +165,19 @@ def run(top, test, **parameters):
             ),
             pytrace=False,
         )
+
+
+def of_netlist(sim, family, source, parameters):
+    """(other sources, source of the top, arguments) of the simulation of a module's netlist."""
+    *others, top = netlist.sources(family, source, parameters, search_path())
+    quiet = ["-Wno-timescale"] if sim == "icarus" else ["-Wno-lint", "-Wno-style", "-Wno-fatal"]
+    return others, top, quiet
+
+
+def rtl_only(reason):
+    """In a cocotb test: skip it on a netlist, for a reason such as what it reads inside."""
+    if os.environ.get("NETLIST"):
+        pytest.skip(reason)
 
 
 def results(path):

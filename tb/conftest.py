@@ -3,7 +3,9 @@
 short runs. Files that take long come first, so that none of them is left to one worker at the end.
 """
 
+import inspect
 import os
+import re
 
 from tb.bench import seed
 from twin.build import SHORT_RUNS
@@ -13,12 +15,30 @@ DRAWN = os.environ.get("SEED") == "random"
 SEED = seed()
 
 
-LONG = ("docs", "system", "control", "twin", "peripheral")  # folders, from the longest on
+SIMULATES = re.compile(
+    r"\brun\([^()]*(\([^()]*\))?[^()]*__file__"
+)  # a test of a block has a netlist
+LONG = ("docs", "system", "control", "twin", "peripheral", "netlist")  # folders, the longest first
+NODE_TESTS = ("test_twin.py", "test_s0_stage.py")  # of a node, which run on its netlist too
 
 
-def pytest_collection_modifyitems(items):
+def of_block(item):
+    """Whether a test simulates a block by tb.bench.run."""
+    return bool(SIMULATES.search(inspect.getsource(item.function)))
+
+
+def on_node(item):
+    """Whether a test runs the twin of a node, and there is a netlist of it: the ECP5's."""
+    return os.environ.get("NETLIST") == "ecp5" and item.path.name in NODE_TESTS
+
+
+def pytest_collection_modifyitems(config, items):
     order = {name: n for n, name in enumerate(LONG)}
     items.sort(key=lambda item: order.get(item.path.parent.name, len(LONG)))
+    if os.environ.get("NETLIST") or os.environ.get("POWER_UP"):
+        blocks = [item for item in items if of_block(item) or on_node(item)]
+        config.hook.pytest_deselected(items=[item for item in items if item not in blocks])
+        items[:] = blocks
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks and helpers of the workshop; run them as `python -m tools.NAME`."""
+"""Checks and helpers of the project; run them as `python -m tools.NAME`."""
 
 from collections.abc import Iterable
 from pathlib import Path

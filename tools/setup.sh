@@ -82,7 +82,7 @@ fi
 pip() { "$VENV/bin/python" -m pip --disable-pip-version-check --no-input -q "$@" < /dev/null > "$LOG" 2>&1; }
 last_word() { grep -E '^ERROR' "$LOG" | tail -n 1 | cut -c1-300 || true; }
 
-say "fetching $(grep -c == requirements.lock) pinned Python packages into build/venv: about 1.3 GB on the disk, some minutes the first time"
+say "fetching $(grep -c == requirements.lock) pinned Python packages into build/venv: about 1.6 GB on the disk, some minutes the first time"
 pip install --no-deps -r requirements.lock \
     || stop "the Python packages could not be fetched: is there a way to a Python package index? pip's last word: $(last_word) (log: build/setup.log)"
 pip install --no-deps --no-build-isolation -e ./sw/host -e . \

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Yosys's command line, which its Python package lacks.
 
-python tools/yosys.py "command; command" …        everything it says goes to standard output; ends
-                                                  with 1 after an error
+python tools/yosys.py "command; command" …    prints what Yosys prints; exit code 1 after an error
 """
 
 import sys

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis_memory -- one word for each axis of a node, in LUT RAM: the state or a setting of a block
-// that serves several axes.
+// axis_memory -- store one word for each axis of a node in LUT RAM: the state or a setting of a
+// block that serves several axes.
 //
 // latency  0 cycles from axis to stored, combinational; 1 cycle from write to the new word
 // rate     one read and one write per cycle
 // behaviour  A word is read, changed and written back in the same cycle, so samples of one axis may
-//          follow each other at once. Reset does not clear the words: whoever uses them must know
-//          which have been written. For one axis the word is a register.
+//          follow each other at once. Reset does not clear the words: the block that uses them must
+//          know which have been written. For one axis the word is a register.
 // model    tb/common/axis_memory.py, equal in every bit of every cycle
 // proved   a word changes by a write to its axis only, and then holds what was written
 // proof    depth 4, AXES = 5, WIDTH = 3

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// harmonic_rotation_rom -- the angle of each rotation of harmonic_map.
+// harmonic_rotation_rom -- look up the angle of each rotation of harmonic_map.
 //
 // latency   0 cycles: combinational
 // source    Rotation n turns by atan(2^-n), rounded to 2^-32 turn.

@@ -5,7 +5,7 @@
 // latency   1 cycle from valid to done, and from shift to moved; INDEX + 23 cycles from enable to
 //           moved.
 // rate      one position and one shift per cycle
-// method    The table is busy for the error at one position, and the answer is used until the next
+// method    The table computes the error at one position, and this answer is used until the next
 //           one comes. The error that is subtracted belongs to a position passed at most 2 (INDEX +
 //           23 cycles + the time between two positions) before. In a table that changes by s per
 //           period it is therefore wrong by at most s times the distance moved in that time, and
@@ -13,8 +13,8 @@
 // behaviour The origin moves with the position at each shift: the table stays where it is on the
 //           scale. moved reports every change that is no motion: a shift, and the step when the
 //           correction comes into force or ends. A target that adds moved_by stays as far from the
-//           position as before. stored is the point of read_point when known is high: as soon as
-//           the table is free, also while it is in use.
+//           position as before. A point is read back when the table is free, also while it is in
+//           use: then known is high, and stored is the point of read_point.
 // limits    While enable is high no other setting may change.
 // source    S0: table of equal segments; at standstill the error of the position stays in force
 //           while the table computes the next one
@@ -57,7 +57,7 @@ module segment_correction #(
     logic signed [47:0] first;  // origin, moved with the scale
     // the table is busy; its answer waits for the next position
     logic busy, answered;
-    // enable was low: the table has dropped what it was busy
+    // enable was low: the table has dropped the position that it was busy with
     logic off;
     logic reading;  // a point is to be read back
     wire answers, beyond;  // the table is done; its position was off the table

@@ -6,8 +6,8 @@
 // rate      one step per cycle
 // accuracy  After 2 rounds at standstill the correction is the error at the angle. In a motion of m
 //           counts per round it lags by the change of the table over 2 m counts.
-// method    segment_table is busy for the current angle again and again. A round takes $clog2(2
-//           SEGMENTS + 2) + 23 cycles; the correction stays constant until the next answer.
+// method    segment_table computes the error at the current angle again and again. A round takes
+//           $clog2(2 SEGMENTS + 2) + 23 cycles; the correction is constant until the next answer.
 // behaviour Border n is n / SEGMENTS of a turn from the reference mark, and the last border is the
 //           first one. There are two sets of points. One is in force, the other can be written, two
 //           points per strobe; swap exchanges them and drops the running answer. The sets follow

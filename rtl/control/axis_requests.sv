@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis_requests -- joins the requests of the registers with those of the node.
+// axis_requests -- combine the requests of the registers with those of the node.
 //
 // latency  0 cycles, combinational
 // rate     one request of each kind per cycle

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// common_start -- starts several axes in the same cycle, by a register of the node or by the sync
+// common_start -- start several axes in the same cycle, by a register of the node or by the sync
 // pulse of the bus.
 //
 // latency  0 cycles, combinational

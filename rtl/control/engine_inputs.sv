@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_inputs -- what motion_engine sees of one axis: its position and its levels at the last
-// tick, and the requests that wait to be served.
+// engine_inputs -- sample position and levels of one axis for motion_engine at each tick, and hold
+// its requests until they are served.
 //
 // latency   1 cycle from tick or sample to what is seen, from a request to asked and waiting
 // rate      a tick or a sample per cycle, a request of each kind per cycle

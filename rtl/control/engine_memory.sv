@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_memory -- the words of all axes of motion_engine: state, settings, queues, filters and
-// constants.
+// engine_memory -- store the words of all axes of motion_engine: state, settings, queues, filters
+// and constants.
 //
 // latency   1 cycle from read_at to stored, and from write to the new word
 // rate      one word read and one written per cycle, which must not be the same

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_outputs -- what motion_engine reports of one axis: its state, target and velocity as they
-// were given last, and strobes for what an axis does with a result at once.
+// engine_outputs -- hold what motion_engine reported last of one axis: state, target and velocity;
+// give strobes for the results that an axis uses at once.
 //
 // latency   1 cycle from a result to the levels, 0 cycles to the strobes
 // rate      one result per cycle

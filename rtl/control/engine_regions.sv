@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_regions -- what the lines of engine_microcode belong to, for a proof.
+// engine_regions -- report which part of the microcode a line belongs to, for the proof of
+// engine_sequencer.
 //
 // latency   0 cycles, combinational
 // rate      one line per cycle

@@ -29,7 +29,8 @@ module engine_sequencer #(
     output logic        overrun,     // strobe: a tick came before the last one was served
     output logic [15:0] cycles       // cycles that a tick needs at most
 );
-    localparam [5:0] NEVER = 6'd0, TICKING = 6'd16, LOOP = 6'd25, DUE = 6'd26, WRAPPED = 6'd28;
+    localparam [5:0] NEVER = 6'd0, TICKING = 6'd16, NEGATIVE = 6'd24, LOOP = 6'd25, DUE = 6'd26;
+    localparam [5:0] WRAPPED = 6'd28;
     localparam [7:0] FIRST_AXIS = 8'h21, NEXT_AXIS = 8'h22, FINISHED = 8'h25;
     localparam [7:0] SET_TICKING = 8'h50;
     localparam [2:0] COUNT = 3'd5;
@@ -49,16 +50,27 @@ module engine_sequencer #(
     wire  [ 5:0] condition = code[24:19];
     logic [63:0] all;
 
+    // The conditions of both lines that may be fetched are tested at once. The adder knows latest
+    // whether its sum is negative, so that comes last.
+    wire  [ 5:0] next_condition = next_code[24:19];
+    wire  [ 5:0] target_condition = target_code[24:19];
+    wire         next_jump = next_code[25] ? !all[next_condition] : all[next_condition];
+    wire         target_jump = target_code[25] ? !all[target_condition] : all[target_condition];
+    wire         next_tests_sign = next_condition == NEGATIVE;
+    wire         target_tests_sign = target_condition == NEGATIVE;
+    wire         tests_sign = jumped ? target_tests_sign : next_tests_sign;
+    wire         jump = (jumped ? target_jump : next_jump) ^ (tests_sign && conditions[NEGATIVE]);
+
     always_comb begin
         all = conditions;
         all[NEVER] = 1'b0;
+        all[NEGATIVE] = 1'b0;
         all[TICKING] = ticking;
         all[LOOP] = count != 5'd1;
         all[DUE] = busy;
         all[WRAPPED] = axis == 3'd0;
     end
 
-    wire jump = all[condition] != unless;
     wire acts = condition == '0 && !unless;
     wire finishes = action == FINISHED;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_settings -- writes the settings of motion_engine into its memory, in cycles in which the
+// engine_settings -- write the settings of motion_engine into its memory, in cycles in which the
 // engine does not write, and not into the word that the engine is reading.
 //
 // latency   1 cycle from setting_write to write_out when the engine neither writes nor reads a word

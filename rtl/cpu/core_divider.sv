@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// core_divider -- quotients and remainders for the soft core (div, divu, rem, remu), one bit of the
-// quotient per cycle.
+// core_divider -- compute quotients and remainders for the soft core (div, divu, rem, remu), one
+// bit of the quotient per cycle.
 //
 // latency   W + 2 cycles from valid to ready
 // rate      one instruction in W + 3 cycles
@@ -44,8 +44,8 @@ module core_divider #(
 
     logic busy;
     logic [C-1:0] left;  // bits of the quotient that are still to be found
-    logic [W-1:0] remainder;  // less than the amount of b
-    logic [W-1:0] quotient;  // bits of the amount of a that are not used yet, then the quotient
+    logic [W-1:0] remainder;  // less than the magnitude of b
+    logic [W-1:0] quotient;  // bits of the magnitude of a that are not used yet, then the quotient
 
     // An amount is a number without its sign. The remainder minus the amount of b, and whether it
     // is 0 or more; the lowest bits of both operands make the carry that a subtraction needs.

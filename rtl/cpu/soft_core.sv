@@ -2,24 +2,28 @@
 // soft_core -- RISC-V processor (rv32imc) with its memory, the master of the register bus.
 //
 // latency   0 wait cycles for a write to memory, 1 wait cycle for a word read from memory; 0 wait
-//           cycles for an instruction that the memory has read ahead, 1 wait cycle for any other
-//           one; 2 wait cycles for an access to a register, and as many more as ready is low.
+//           cycles for an instruction that the memory has read ahead, 1 wait cycle for the second
+//           half of one that it has not, 2 for any other one; 3 wait cycles for an access to a
+//           register, and as many more as ready is low.
 // rate      An operation takes 3 cycles, a write to memory 5, a word read from memory or a product
-//           6, a register access 7, a quotient 38.
+//           6, a register access 8, a quotient 38.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
 //           8000_0000 (64 KiB, whole words only). Any other access, a misaligned access and an
 //           illegal instruction stop the core: trap is high until rst, which starts the core at
-//           address 0 and leaves the memory as it is. In each cycle in which the core does not use
-//           the memory, the memory reads the word after the last instruction.
-// source    PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the
-//           memory one cycle early
+//           address 0 and leaves the memory as it is. While an access is under way and does not use
+//           the memory, the memory reads the word after the last instruction. Between two accesses
+//           it reads where the core's operand points, which is the address of the next word of data
+//           if the core begins to read one. So every address of the memory comes from a register:
+//           the look-ahead address of the core would reach the block RAMs late.
+// source    PicoRV32, from the package pythondata_cpu_picorv32; the address of a word of data is
+//           its operand pcpi_rs1 one cycle early
 // model     tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
 // proved    Whatever the core does: an access to no valid address raises trap in the next cycle,
 //           and trap stays high until rst. select is a strobe, only for an access to a whole word
-//           of the registers, only while ready is high, never for an instruction, and never in
-//           two cycles that follow each other. Each word that the core takes from the memory was
-//           read at the address of the access, after the last write to that address.
-// proof     depth 6, MEMORY_BYTES = 1024
+//           of the registers, only one cycle after ready was high, never for an instruction, and
+//           never in two cycles that follow each other. Each word that the core takes from the
+//           memory was read at the address of the access, after the last write to that address.
+// proof     depth 12, MEMORY_BYTES = 1024
 `default_nettype none
 
 module soft_core #(
@@ -28,7 +32,7 @@ module soft_core #(
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire         ready,    // level: the registers take an access
+    input  wire         ready,    // level: the registers take an access in the next cycle
     output logic        select,   // strobe: one access to the registers
     output logic        write,    // level: with select, wdata is to be written
     output logic [15:0] address,  // byte address of a register
@@ -49,10 +53,12 @@ module soft_core #(
     wire [31:0] pcpi_insn, pcpi_rs1, pcpi_rs2, pcpi_rd;
     // the registers will answer in the next cycle, have answered; an access had no valid address
     logic awaited, answered, lost;
-    // the memory has just read a word for the core; or the word after the last instruction
-    logic for_core, ahead;
-    logic [31:0] word;  // what the memory had read one cycle earlier
-    logic has_core, has_ahead;  // word is for the core; and it was read ahead
+    // the first cycle of an access; it reads memory; the memory read `following` one cycle before;
+    // no access was under way then; and the memory read mem_addr
+    logic first, begun, coming, direct, sought;
+    logic [31:0] word;  // what the memory had read, for the core or the word `next`
+    logic fresh, held;  // the memory has just read the word `next`; `word` is that word
+    logic has_core, has_ahead;  // `word` is for the core; and it was read ahead
     logic storing;  // the core writes to the memory
     logic [A-3:0] next;  // number of the word after the last instruction
 
@@ -63,34 +69,51 @@ module soft_core #(
     // A word that is read passes through a register, since the block RAMs, the selection among them
     // and the expansion of a compressed instruction together take longer than a cycle.
     wire [A-3:0] following = mem_valid && mem_instr ? mem_addr[A-1:2] + (A - 2)'(1) : next;
-    wire [A-3:0] read_address = mem_la_read ? mem_la_addr[A-1:2] : following;
+    wire same = mem_la_addr[A-1:2] == following;
+    wire passes = first && mem_instr;  // `following` is no longer `next`
+    wire arrives = (begun && (coming || (direct && !mem_instr))) || sought;
+    wire overwrites = arrives || (storing && mem_addr[A-1:2] == next);
+    wire known = (fresh || held) && !passes && !overwrites;
+    wire seek = begun && !arrives;
+    wire [A-3:0] under_way = seek ? mem_addr[A-1:2] : following;
+    wire [A-3:0] read_address = mem_valid ? under_way : pcpi_rs1[A-1:2];
     wire memory_ready = has_core || has_ahead || storing;
     wire mem_ready = answered || memory_ready;
 
-    assign select  = mem_valid && in_registers && ready && !awaited && !answered;
     assign write   = mem_wstrb[0];
     assign address = mem_addr[15:0];
     assign wdata   = mem_wdata;
     assign trap    = core_trap || lost;
 
     always_ff @(posedge clk) begin
+        select    <= mem_valid && in_registers && ready && !(select || awaited || answered);
         awaited   <= select;
         answered  <= awaited;
-        word      <= memory_rdata;
         next      <= following;
-        for_core  <= mem_la_read && la_in_memory;
-        ahead     <= !mem_la_read && !storing;
+        first     <= mem_la_read;
+        begun     <= mem_la_read && la_in_memory && !(same && known);
+        coming    <= same && mem_valid && !seek && !storing;
+        direct    <= !mem_valid;
+        sought    <= seek && mem_valid && !mem_ready;
+        fresh     <= mem_valid && !seek && !storing;
+        held      <= known;
         storing   <= mem_la_write && la_in_memory && !core_trap;
-        has_core  <= for_core && mem_valid && !mem_ready;
-        has_ahead <= ahead && mem_la_read && la_in_memory && mem_la_addr[A-1:2] == following;
+        has_core  <= arrives && mem_valid && !mem_ready;
+        has_ahead <= mem_la_read && la_in_memory && same && known;
+        if (arrives || fresh) word <= memory_rdata;
         if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
         if (rst) begin
+            select    <= 1'b0;
             awaited   <= 1'b0;
             answered  <= 1'b0;
             lost      <= 1'b0;
             next      <= '0;
-            for_core  <= 1'b0;
-            ahead     <= 1'b0;
+            first     <= 1'b0;
+            begun     <= 1'b0;
+            coming    <= 1'b0;
+            sought    <= 1'b0;
+            fresh     <= 1'b0;
+            held      <= 1'b0;
             storing   <= 1'b0;
             has_core  <= 1'b0;
             has_ahead <= 1'b0;
@@ -176,22 +199,34 @@ module soft_core #(
     wire  overwritten = storing && mem_addr[A-1:2] == read_number;
     logic past = 1'b0;
     always @(posedge clk) begin
-        past        <= 1'b1;
-        word_number <= read_number;
-        word_old    <= read_old || overwritten;
-        read_old    <= storing && (read_old || overwritten);
+        past <= 1'b1;
+        if (arrives || fresh) begin
+            word_number <= read_number;
+            word_old    <= read_old || overwritten;
+        end else if (storing && mem_addr[A-1:2] == word_number) word_old <= 1'b1;
+        read_old <= storing && (read_old || overwritten);
         if (!storing) read_number <= read_address;
         if (!past) assume (rst);
         // the core begins no access before the last one is done
         if (mem_la_read || mem_la_write) assume (!mem_valid || mem_ready);
+        // and keeps it until then
+        if (past && !$past(rst) && $past(mem_valid && !mem_ready)) begin
+            assume (mem_valid && $stable(mem_addr));
+            assume ($stable(mem_instr) && $stable(mem_wstrb));
+        end
+        // the address of a word of data was in its operand
+        if (past && first && mem_valid && !mem_instr && mem_wstrb == '0 && in_memory)
+            assume (mem_addr[A-1:2] == $past(pcpi_rs1[A-1:2]));
         if (past && !$past(rst)) begin
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);
-            assert (!(select && $past(select)));
-            if (select) assert (mem_valid && !in_memory && !mem_instr && ready);
+            assert (32'(select) + 32'(awaited) + 32'(answered) <= 1);
+            if (select) assert (mem_valid && !in_memory && !mem_instr && $past(ready));
             if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
             if (write && select) assert (mem_wstrb == '1);
             if (storing) assert (mem_valid && in_memory);
+            if (fresh) assert (read_number == next && !read_old);
+            if (held) assert (word_number == next && !word_old);
             if (mem_valid && memory_ready && !storing && !core_trap) begin
                 assert (in_memory && mem_wstrb == '0);
                 assert (word_number == mem_addr[A-1:2] && !word_old);

@@ -15,8 +15,8 @@
 //          C); here they need no correction.
 // model    tb/decode/quadrature_decoder.py, equal in every bit of every cycle
 // proved   count moves by at most one, only at a single edge and in its direction, and never
-//          together with illegal; in the x4, x2 and x1 modes count and levels agree for ever if
-//          there is no illegal edge
+//          together with illegal; in the x4, x2 and x1 modes count and levels always agree if there
+//          is no illegal edge
 // proof    W = 8
 `default_nettype none
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bridge_pwm -- edge-aligned sign-magnitude PWM for an H-bridge driver with two inputs.
+// bridge_pwm -- make edge-aligned sign-magnitude PWM for an H-bridge driver with two inputs.
 //
 // latency   10 cycles from valid to the first period border that applies the command. Both pins are
 //           low 1 cycle after enable falls.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// drive_select -- routes the command of an axis to the kind of drive that the registers select.
+// drive_select -- route the command of an axis to the kind of drive that the registers select.
 //
 // latency  0 cycles, combinational
 // rate     one command per cycle

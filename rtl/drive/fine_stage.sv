@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// fine_stage -- PI loop of the fine stage, which works on the same target as the main servo and
+// fine_stage -- control the fine stage: a PI loop with the same target as the main servo, which
 // drives the DAC.
 //
 // latency  53 cycles from tick to command

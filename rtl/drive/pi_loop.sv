@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// pi_loop -- PI controller in serial arithmetic: 2^16 command = kp e + integral, where e = target -
-// position, and integral += ki e.
+// pi_loop -- compute a PI controller in serial arithmetic: 2^16 command = kp e + integral, where e
+// = target - position, and integral += ki e.
 //
 // latency   53 cycles from tick to valid
 // rate      one command per tick, a tick at least 53 cycles after the one before. An earlier tick
@@ -73,22 +73,23 @@ module pi_loop (
     wire                no_power = stale || powerless;
     wire                retakes = (fresh || changed || changed_taken || gains_changed) && ki != '0;
     wire                hold = no_power || retakes;
-    // 2^0 command
-    wire signed  [49:0] asked = hold ? {{34{sum[31]}}, sum[31:16]} : total[65:16];
+    // the limit may have changed since the sum was limited
+    wire signed  [15:0] summed = sum[31:16];
+    wire                above = summed > $signed({1'b0, limit});
+    wire                below = summed < -$signed({1'b0, limit});
+
+    // 2^0 command; what is held and what is computed are compared at once, since hold is known late
+    wire signed  [49:0] whole = total[65:16];
     wire signed  [49:0] high = {35'd0, limit};
-    wire                too_high = asked > high;
-    wire                too_low = asked < -high;
+    wire                too_high = hold ? above : whole > high;
+    wire                too_low = hold ? below : whole < -high;
     wire signed  [31:0] most = {1'b0, limit, 16'd0};
-    wire signed  [31:0] computed = {asked[15:0], hold ? sum[15:0] : total[15:0]};
+    wire signed  [31:0] computed = hold ? sum : total[31:0];
 
     wire                total_fits = total[65:33] == {33{total[65]}};
     wire signed  [33:0] total_near = total_fits ? total[33:0] : {total[65], {33{~total[65]}}};
     wire signed  [34:0] jump = {{3{sum[31]}}, sum} - {total_near[33], total_near};
 
-    // the limit may have changed since the sum was limited
-    wire signed  [15:0] summed = sum[31:16];
-    wire                above = summed > $signed({1'b0, limit});
-    wire                below = summed < -$signed({1'b0, limit});
     wire signed  [15:0] not_below = below ? -{1'b0, limit} : summed;
     wire signed  [15:0] closed_command = above ? {1'b0, limit} : not_below;
     wire signed  [15:0] new_command = closed_loop ? closed_command : open_command;

@@ -14,7 +14,7 @@
 // source    S1: A, B and Z are sent on as if the relay were the encoder
 // model     tb/drive/quadrature_encoder.py, equal in every bit of every cycle
 // proved    a and b never change in the same cycle. No edge comes sooner than
-//           `minimum_edge_separation` after the one before. Pins and position agree for ever. A
+//           `minimum_edge_separation` after the one before. Pins and position always agree. A
 //           target that moves no faster than the minimum edge separation is followed within 1/2 +
 //           hysteresis + 1 count.
 // proof     W = 6, F = 2, SEPARATION_W = 3

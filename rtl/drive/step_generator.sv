@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// step_generator -- output a line as steps for a stepper motor driver; step_lines gives the rate of
-// each line.
+// step_generator -- send steps to a stepper motor driver along straight lines, whose rates come
+// from step_lines.
 //
 // latency   1 cycle from the line passing a whole step to the active edge on the pin, or as soon as
 //           the pin timings allow. The line moves by its rate in each cycle from the one after

@@ -9,9 +9,9 @@
 //           counts.
 // accuracy  A line ends less than period * 2^-RATE_F step above its target, and the next one begins
 //           there, so that no tick loses anything.
-// method    rate = floor((distance * 2^(RATE_F - 16) + rest) / period), where the rest of the
-//           division is kept for the next line. It begins as period - 1, which rounds up: a line
-//           that leads up to a whole step is never late. Restoring division, a bit per cycle.
+// method    rate = floor((distance * 2^(RATE_F - 16) + remainder) / period), where the remainder
+//           of the division is saved for the next line. It begins as period - 1, which rounds up: a
+//           line that leads up to a whole step is never late. Restoring division, a bit per cycle.
 // behaviour The first line after `stopped`, and one to a target with restart_in, has the rate 0 and
 //           begins and ends at the whole step below the target (rate_restart). A target that is a
 //           step per cycle or more away has no rate (rate_steep).
@@ -79,7 +79,7 @@ module step_lines #(
         DIVIDE,
         GIVE
     } state;
-    logic [A-1:0] seen;  // axis that is looked at
+    logic [A-1:0] seen;  // number of the axis whose turn it is
     logic [5:0] bits_left;  // of the quotient, less one
     logic signed [47:0] distance;  // 2^-16 step
     logic [P-1:0] remainder;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// core_watchdog -- reports that the soft core has stopped or hangs, while a drive of the node is
-// on.
+// core_watchdog -- report that the soft core has stopped or hangs, while a drive of the node is on.
 //
 // latency  0 cycles from trap to stopped; SILENCE_MS * (CLK_HZ / 1000) + 1 cycles from the last
 //          kick

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// drive_interlock -- permission to drive: latches faults and blocks commands into a pressed limit
+// drive_interlock -- permit the drive, latch faults, and block commands into a pressed limit
 // switch. Firmware can only request the drive.
 //
 // latency   1 cycle from a cause to faults and to enabled low, and from command_in to command_out;

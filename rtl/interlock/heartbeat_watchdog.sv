@@ -3,7 +3,7 @@
 //
 // latency   time_ms * (CLK_HZ / 1000) + 1 cycles from the last kick, or the rise of armed if later,
 //           to expired; expired falls 1 cycle after a kick or after the fall of armed.
-// behaviour Used for the master on the RS-485 bus, where a good frame is the kick, and for the soft
+// behaviour It watches the master on the RS-485 bus, where each good frame is a kick, and the soft
 //           core, whose firmware kicks once per round of its main loop.
 // model     tb/interlock/heartbeat_watchdog.py, equal in every bit of every cycle
 // proved    expired rises only while armed, and only without a kick in the cycle before. It stays

@@ -3,13 +3,17 @@
 // 256 points.
 //
 // latency  4 cycles from valid to done
-// rate     one phase per cycle; one table entry per cycle
+// rate     one phase per cycle; one table entry per cycle without a phase
 // behaviour There are two tables: one is in use while the other is written. swap exchanges them
 //          between two phases, so no phase ever uses a partially written table. Until the first
-//          swap nothing is corrected. With AXES above 1 each axis has its own two tables.
-// method   The even points are in one memory and the odd ones in another, so both neighbours of a
-//          phase are read at once. The correction is the sum of both, each weighted with the
-//          distance of the phase from the other one.
+//          swap nothing is corrected. With AXES above 1 each axis has its own two tables. An entry
+//          is stored in the next cycle without a phase after write; one that is written before
+//          then takes its place.
+// method   All tables are in one memory with two ports, which take one block RAM for one or two
+//          axes. One port reads the even points and the other one the odd ones, so both neighbours
+//          of a phase are read at once; the port of the even points also writes. The correction is
+//          the sum of both neighbours, each weighted with the distance of the phase from the other
+//          one.
 // accuracy the chords of a sine of order 9 leave 0.6 % of it, those of order 2 leave 0.03 %
 // source   Fourier series of the sub-division error, orders up to 9
 //          (sw/firmware/calibration/calibration.c)
@@ -35,12 +39,14 @@ module harmonic_correction #(
     output logic done,  // strobe: phase_out is new
     output logic [15:0] phase_out  // 2^-16 period: phase less its correction, rounded
 );
-    localparam int B = AXES == 1 ? 8 : A + 8;  // bits of an address: axis, table, half a point
+    localparam int B = AXES == 1 ? 9 : A + 9;  // bits of an address: axis, table, point
 
-    // a table is never read and written at once, so the memory need not care what it would read
-    // then
-    (* no_rw_check *)logic signed [17:0] even_table[0:(1<<B)-1];
-    (* no_rw_check *)logic signed [17:0] odd_table [0:(1<<B)-1];
+    // nothing that is read while an entry is stored is used, so the memory need not care what that
+    // would be
+    (* no_rw_check *)logic signed [ 17:0] tables                                [0:(1<<B)-1];
+    logic                waits;  // an entry waits to be stored
+    logic        [B-1:0] entry;  // its address
+    logic signed [ 17:0] entry_value;
     logic [AXES-1:0] page, swapped;  // the table in use; swapped: there is one
     logic signed [17:0] even, odd, even_q, odd_q;
     logic [8:0] odd_weight, odd_weight_q, even_weight_q;  // 2^-8
@@ -48,18 +54,20 @@ module harmonic_correction #(
     logic [15:0] phase_q, phase_qq, phase_qqq;
     logic acts_q, acts_qq, acts_qqq, read, weighed, multiplied;
 
-    wire               swap_here = swap && axis == table_axis;
-    wire               in_force = page[axis] ^ swap_here;
-    wire               spare = !(page[table_axis] ^ swap);  // the table that can be written
-    wire        [ 6:0] even_point = phase[15:9] + 7'(phase[8]);
-    wire signed [26:0] sum = even_part + odd_part + 27'sd2048;
-    wire signed [14:0] change = 15'(sum >>> 12);  // rounded to 2^-16 period
+    wire                swap_here = swap && axis == table_axis;
+    wire                in_force = page[axis] ^ swap_here;
+    wire                spare = !(page[table_axis] ^ swap);  // the table that can be written
+    wire        [  6:0] even_point = phase[15:9] + 7'(phase[8]);
+    wire signed [ 26:0] sum = even_part + odd_part + 27'sd2048;
+    wire signed [ 14:0] change = 15'(sum >>> 12);  // rounded to 2^-16 period
+
+    wire                store = waits && !valid;
+    wire        [B-1:0] even_at = store ? entry : B'({axis, in_force, even_point, 1'b0});
 
     always_ff @(posedge clk) begin
-        if (write && !point[0]) even_table[B'({table_axis, spare, point[7:1]})] <= value;
-        if (write && point[0]) odd_table[B'({table_axis, spare, point[7:1]})] <= value;
-        even <= even_table[B'({axis, in_force, even_point})];
-        odd  <= odd_table[B'({axis, in_force, phase[15:9]})];
+        if (store) tables[even_at] <= entry_value;
+        even <= tables[even_at];
+        odd  <= tables[B'({axis, in_force, phase[15:9], 1'b1})];
     end
 
     always_ff @(posedge clk) begin
@@ -87,11 +95,17 @@ module harmonic_correction #(
             odd_part  <= 27'(odd_q * $signed({1'b0, odd_weight_q}));
         end
         if (multiplied) phase_out <= phase_qqq - (acts_qqq ? 16'(change) : 16'd0);
+        waits <= write || (waits && valid);
+        if (write) begin
+            entry       <= B'({table_axis, spare, point});
+            entry_value <= value;
+        end
         if (swap) begin
             page[table_axis]    <= !page[table_axis];
             swapped[table_axis] <= 1'b1;
         end
         if (rst) begin
+            waits     <= 1'b0;
             read      <= 1'b0;
             weighed     <= 1'b0;
             multiplied   <= 1'b0;

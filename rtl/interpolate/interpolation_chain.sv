@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// interpolation_chain -- from samples of sine and cosine to steps of the position: outlier filter,
-// correction, arctan, harmonic correction, tracking and count check, for several axes.
+// interpolation_chain -- turn samples of sine and cosine into steps of the position: outlier
+// filter, correction, arctan, harmonic correction, tracking and count check, for several axes.
 //
 // latency  21 cycles from valid to done for one axis. With several axes 22 cycles for the axis that
 //          is served first, 1 cycle more for each axis with a lower number whose sample waits, too:

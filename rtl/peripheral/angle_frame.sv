@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// angle_frame -- receives the frames of a time-grating angle sensor: A5, sequence number, angle (4
+// angle_frame -- receive the frames of a time-grating angle sensor: A5, sequence number, angle (4
 // bytes, low first), CRC-16 (low first).
 //
 // latency  2 cycles from the last byte to valid

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// angle_sensor_port -- receiver of an absolute angle sensor; if it is not built, it reports
-// nothing.
+// angle_sensor_port -- receive the frames of an absolute angle sensor; if it is not built, it
+// reports nothing.
 //
 // latency  see angle_frame
 // rate     one frame at a time
 // source   S4: the sub-controller reads a time-grating sensor
-// model    the models of its blocks; proved in motion by tb/peripheral/test_peripherals.py
+// model    the models of its blocks; tested together by tb/peripheral/test_peripherals.py
 `default_nettype none
 
 module angle_sensor_port #(

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// display_port -- SPI to the driver of a numeric display, with a queue of words; if it is not
+// display_port -- send words from a queue to the driver of a numeric display by SPI; if it is not
 // built, its pins are idle.
 //
 // latency  see spi_word_sender
 // rate     one word at a time, 16 in the queue; sclk is at most 1 MHz
 // source   S0: numeric display
-// model    the models of its blocks; proved in motion by tb/peripheral/test_peripherals.py
+// model    the models of its blocks; tested together by tb/peripheral/test_peripherals.py
 `default_nettype none
 
 module display_port #(

@@ -7,7 +7,7 @@
 // behaviour  Each command gives one result, in their order. Pulses of less than 50 ns on the lines
 //          are filtered.
 // source   S4: the main controller has a panel and an EEPROM on I2C
-// model    the models of its blocks; proved in motion by tb/peripheral/test_peripherals.py
+// model    the models of its blocks; tested together by tb/peripheral/test_peripherals.py
 `default_nettype none
 
 module i2c_port #(

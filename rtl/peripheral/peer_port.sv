@@ -5,7 +5,7 @@
 // latency  see uart_rx and uart_tx
 // rate     one byte each way at a time, 64 in each queue
 // source   S4: the main controller speaks to the sub-controller
-// model    the models of its blocks; proved in motion by tb/peripheral/test_peripherals.py
+// model    the models of its blocks; tested together by tb/peripheral/test_peripherals.py
 `default_nettype none
 
 module peer_port #(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_arbiter -- selects the source of what the PS/2 host receives: the keyboard, whose bytes pass
+// ps2_arbiter -- select the source of what the PS/2 host receives: the keyboard, whose bytes pass
 // unchanged, or a source that injects sequences.
 //
 // latency  0 cycles: a waiting byte is offered, and taken, in the same cycle

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_device -- the keyboard's side of a PS/2 line: makes the clock, sends bytes, receives the
-// host's commands and acknowledges them.
+// ps2_device -- be the keyboard of a PS/2 line: make the clock, send bytes, receive the host's
+// commands and acknowledge them.
 //
 // latency  70 us of released lines before the first falling clock edge of a byte; 20 us if they
 //          were released for 50 us before send_valid

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_host -- the host's side of a PS/2 line: receives the bytes of a keyboard, sends it commands,
-// and holds it by pulling the clock low.
+// ps2_host -- be the host of a PS/2 line: receive the bytes of a keyboard, send it commands, and
+// hold it by pulling the clock low.
 //
 // latency  2 cycles from the eleventh falling clock edge to received_valid
 // rate     one byte per frame; a byte that waits holds the keyboard until it is taken

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_inject_queue -- queue of scan codes to inject, which can be dropped; a sequence that has
+// ps2_inject_queue -- queue scan codes to inject; they can be dropped, but a sequence that has
 // begun is completed.
 //
 // latency  2 cycles from push to valid in an empty queue
 // rate     one push and one code per cycle
-// source   S4: the operator who presses STOP also means the keys that still wait to start a cut
+// source   S4: an operator who presses STOP also means the keys that still wait to start a cut
 // model    tb/peripheral/ps2_inject_queue.py, equal in every bit of every cycle
 // proof    DEPTH = 4
 // proved   a code that was in the queue at a drop is offered only as part of a sequence that had

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_pass -- passes everything between a PS/2 keyboard and its host unchanged in both directions,
-// and injects sequences.
+// ps2_pass -- pass everything between a PS/2 keyboard and its host unchanged in both directions,
+// and inject sequences.
 //
 // latency  less than 200 us from the eleventh edge of a byte to the eleventh edge of its copy,
 //          beyond the ten bits of the copy

@@ -5,7 +5,7 @@
 // latency  see ps2_pass
 // rate     one scan code at a time, 32 in the queue
 // source   S4: the main controller is a keyboard of the EDM machine
-// model    the models of its blocks; proved in motion by tb/peripheral/test_peripherals.py
+// model    the models of its blocks; tested together by tb/peripheral/test_peripherals.py
 `default_nettype none
 
 module ps2_port #(

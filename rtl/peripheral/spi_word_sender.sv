@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// spi_word_sender -- sends words of 16 bits to a device that takes them at the rising edge of its
+// spi_word_sender -- send words of 16 bits to a device that takes them at the rising edge of its
 // chip select, such as a DAC or a display driver.
 //
 // latency  33 * half_period + 1 cycles from valid and ready to the rising edge of cs_n; cs_n falls

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// status_input_port -- two slow status inputs of another machine; if it is not built, it reports
-// nothing.
+// status_input_port -- read two slow status inputs of another machine; if it is not built, it
+// reports nothing.
 //
 // latency  see status_inputs
 // rate     see status_inputs
 // source   S4: the EDM machine reports by contacts whether it cuts and whether it has a fault
-// model    the models of its blocks; proved in motion by tb/peripheral/test_peripherals.py
+// model    the models of its blocks; tested together by tb/peripheral/test_peripherals.py
 `default_nettype none
 
 module status_input_port #(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// capture_events -- makes the events that capture a position from the index, the software strobe
-// and the sync pulse of the bus.
+// capture_events -- make the events that capture a position from the index, the software strobe and
+// the sync pulse of the bus.
 //
 // latency  0 cycles for software, and for the index of a position made of phases; DELAY cycles for
 //          the index of a position made of counts

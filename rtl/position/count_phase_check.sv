@@ -4,7 +4,7 @@
 //
 // latency  3 cycles from valid to disagreement
 // rate     one step per cycle
-// method   The steps of the position are added up, and the count is subtracted. What is left is 0
+// method   The steps of the position are added up, and the count is subtracted. The difference is 0
 //          when both move alike, wherever the origin is: a shift of the origin changes nothing.
 // behaviour  The position at which both agree is learned from the first step after reset or after
 //          `learn`, and from every step while limit is 0. With AXES above 1 it serves several axes;

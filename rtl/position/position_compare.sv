@@ -8,7 +8,7 @@
 //          until disarm. The first point counts only after a position before it has been seen, so
 //          points behind the start cause no burst of pulses. A point is passed when a position
 //          reaches it or goes beyond. Only the next point is compared, and with the farthest
-//          position so far: moving to and fro over a point passes it once, and a step over many
+//          position so far: moving back and forth over a point passes it once, and a step over many
 //          points passes them all. Points that are reached during a pulse or its gap are passed
 //          one by one, in order and without omission, as soon as it has ended: such pulses are
 //          exactly gap_length apart, and each of them is reported by late. With step = 0 there is

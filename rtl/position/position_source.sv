@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// position_source -- selects what the position is made of: the phases of sine and cosine, or the
+// position_source -- select what the position is made of: the phases of sine and cosine, or the
 // counts of A and B.
 //
 // latency  0 cycles, combinational

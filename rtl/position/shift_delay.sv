@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// shift_delay -- delays a shift of the origin by one cycle, for blocks behind the segment table.
+// shift_delay -- delay a shift of the origin by one cycle, for blocks behind the segment table.
 //
 // latency  1 cycle
 // rate     one shift per cycle

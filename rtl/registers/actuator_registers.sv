@@ -7,7 +7,7 @@
 // behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
-// made     by tables/registers.py, never by hand
+// made     by tables/registers.py, not to be edited
 `default_nettype none
 
 module actuator_registers #(
@@ -23,22 +23,32 @@ module actuator_registers #(
     input  wire         [ 5:0] word,                       // index of the word
     input  wire         [31:0] wdata,                      // value to write
     output logic        [31:0] rdata,                      // live bits read; else 0
-    output logic        [ 1:0] drive,                      // kind of drive
+    // kind of drive: 0 bridge, 1 stepper, 2 DAC
+    output logic        [ 1:0] drive,
     output logic        [15:0] pwm_period,                 // PWM period of the bridge [cycle]
-    output logic        [13:0] step_pulse_high,            // shortest times of a step pulse, cycle
-    output logic        [13:0] step_pulse_low,             // shortest times of a step pulse, cycle
-    output logic        [13:0] step_direction_setup,       // cycle
-    output logic        [13:0] step_direction_hold,        // cycle
-    output logic        [ 1:0] step_output_mode,           // 0 step and direction
+    // shortest times of a step pulse: high [cycle]
+    output logic        [13:0] step_pulse_high,
+    // shortest times of a step pulse: low [cycle]
+    output logic        [13:0] step_pulse_low,
+    // shortest times of the direction before and after a step pulse: setup [cycle]
+    output logic        [13:0] step_direction_setup,
+    // shortest times of the direction before and after a step pulse: hold [cycle]
+    output logic        [13:0] step_direction_hold,
+    // 0 step and direction, 1 quadrature, 2 pulses up and pulses down
+    output logic        [ 1:0] step_output_mode,
     output logic               step_output_step_low,       // 1: step is active low
     output logic               step_output_direction_low,  // 1: direction is low going up
     input  wire signed  [31:0] steps,                      // steps sent since reset [step]
-    output logic        [ 7:0] dac_half_period,            // half a period of its clock, cycle
-    output logic        [15:0] dac_refresh,                // cycle
+    // half a period of its clock; 0 acts as 1 [cycle]
+    output logic        [ 7:0] dac_half_period,
+    // time after which the last word is sent again [cycle]
+    output logic        [15:0] dac_refresh,
     output logic signed [15:0] dac_trim,                   // offset added to each word
-    output logic        [23:0] fine_kp,                    // 1/65536 command/(period/65536)
+    // proportional gain of the fine stage [1/65536 command/(period/65536)]
+    output logic        [23:0] fine_kp,
     output logic               fine_kp_written,            // strobe: new value
-    output logic        [23:0] fine_ki,                    // 1/16777216 command/(period/65536)
+    // integral gain of the fine stage, each tick [1/16777216 command/(period/65536)]
+    output logic        [23:0] fine_ki,
     output logic        [14:0] fine_limit,                 // largest |command| of the fine stage
     input  wire signed  [15:0] fine_command                // command of the fine stage
 );

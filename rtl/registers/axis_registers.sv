@@ -6,7 +6,7 @@
 // behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
-// made     by tables/registers.py, never by hand
+// made     by tables/registers.py, not to be edited
 `default_nettype none
 
 module axis_registers #(
@@ -20,67 +20,112 @@ module axis_registers #(
     input  wire         [ 5:0] word,                            // index of the word
     input  wire         [31:0] wdata,                           // value to write
     output logic        [31:0] rdata,                           // live bits read; else 0
-    output logic               control_enable,                  // requests the drive
-    output logic               control_closed_loop,             // 1
-    output logic               control_homing,                  // homing
-    output logic               control_fine,                    // 1
-    output logic               strobes_reset_faults,            // strobe
-    output logic               strobes_set_target_to_position,  // strobe
+    // requests the drive; the interlock grants it only without a latched fault
+    output logic               control_enable,
+    // 1: the servo commands the drive, 0: open_command does
+    output logic               control_closed_loop,
+    // homing; 1: a limit switch only blocks motion towards it, 0: it is a fault
+    output logic               control_homing,
+    // 1: the fine stage holds; the main command keeps its value. 0: the fine stage returns to its
+    // middle
+    output logic               control_fine,
+    // strobe: clears latched faults whose cause is gone; needs enable = 0
+    output logic               strobes_reset_faults,
+    // strobe: sets the target to the position, and empties the profile queue
+    output logic               strobes_set_target_to_position,
     output logic               strobes_start,                   // strobe: plays the queued segments
-    output logic               strobes_controlled_stop,         // strobe: controlled stop
-    output logic               strobes_arm,                     // strobe
+    // strobe: controlled stop: empties the queue, and stops the target within stop_deceleration and
+    // stop_jerk
+    output logic               strobes_controlled_stop,
+    // strobe: plays the queued segments when the time stamp reaches start_at
+    output logic               strobes_arm,
     input  wire                state_enabled,                   // the drive is on
-    input  wire                state_limit_low,                 // switch at the low end
-    input  wire                state_limit_high,                // switch at the high end
+    // switch at the low end, 1: pressed; filtered
+    input  wire                state_limit_low,
+    // switch at the high end, 1: pressed; filtered
+    input  wire                state_limit_high,
     input  wire                state_estop,                     // emergency stop, 1: pressed
-    input  wire                state_drive_fault,               // drive fault
+    // drive fault, 1: the drive reports a fault
+    input  wire                state_drive_fault,
     input  wire                state_moving,                    // a profile is being played
     input  wire                state_saturated,                 // the command is at its limit
     input  wire         [ 4:0] state_queue_free,                // segments that can be queued
     input  wire                state_armed,                     // a profile waits for start_at
     input  wire                state_fine_saturated,            // fine stage at its limit
-    input  wire         [11:0] faults,                          // latched faults
-    input  wire         [11:0] causes_now,                      // causes present now
-    input  wire         [11:0] first_fault,                     // cause that came first
-    input  wire signed  [47:0] fault_position,                  // 1/65536 period
+    input  wire         [11:0] faults,                          // levels: latched faults
+    // causes present now, same bits as faults
+    input  wire         [11:0] causes_now,
+    // cause that came first, same bits as faults; one bit
+    input  wire         [11:0] first_fault,
+    // position when the first fault was latched [1/65536 period]
+    input  wire signed  [47:0] fault_position,
     input  wire signed  [47:0] position,                        // position [1/65536 period]
-    input  wire signed  [47:0] target,                          // 1/65536 period
+    // target of the servo [1/65536 period]
+    input  wire signed  [47:0] target,
     input  wire signed  [31:0] velocity,                        // velocity [1/65536 period/tick]
-    output logic signed [31:0] shift_origin,                    // shift of the origin, period
+    // shift of the origin: position and target both grow by this many whole periods, in one cycle
+    // [period]
+    output logic signed [31:0] shift_origin,
     output logic               shift_origin_written,            // strobe: new value
-    input  wire                zero_crossing_up,                // strobe: crossed going up
-    input  wire                zero_crossing_down,              // strobe: crossed going down
-    output logic        [ 5:0] sensing_deglitch,                // samples in a row that a, sample
+    // strobe: crossed going up; write 1 to clear
+    input  wire                zero_crossing_up,
+    // strobe: crossed going down; write 1 to clear
+    input  wire                zero_crossing_down,
+    // samples in a row that a, b and z must have the same level; one in each edge_filter.skip + 1
+    // cycles [sample]
+    output logic        [ 5:0] sensing_deglitch,
     output logic               sensing_written,                 // strobe: new value
-    output logic        [15:0] amplitude_window_low,            // amplitude window
-    output logic        [15:0] amplitude_window_high,           // amplitude window
+    // amplitude window; full scale 2^(W-1): low
+    output logic        [15:0] amplitude_window_low,
+    // amplitude window; full scale 2^(W-1): high
+    output logic        [15:0] amplitude_window_high,
     output logic               disagreement_limit_written,      // strobe: new value
-    input  wire signed  [15:0] sample_sin,                      // last sample
-    input  wire signed  [15:0] sample_cos,                      // last sample
-    input  wire         [15:0] phase_phase,                     // 1/65536 period
+    // last sample, after the outlier filter; full scale 2^(W-1): sin
+    input  wire signed  [15:0] sample_sin,
+    // last sample, after the outlier filter; full scale 2^(W-1): cos
+    input  wire signed  [15:0] sample_cos,
+    // phase and amplitude of the last sample: phase [1/65536 period]
+    input  wire         [15:0] phase_phase,
     input  wire         [15:0] phase_amplitude,                 // amplitude, full scale 2^(W-1)
-    input  wire signed  [31:0] quadrature_count,                // 1/4 period
-    input  wire         [ 5:0] encoder_events,                  // strobes: encoder events
-    output logic        [ 5:0] encoder_fault_mask,              // encoder events that are a fault
-    input  wire                rejected_pulses,                 // strobe: pulses of a
-    input  wire                rejected_samples,                // strobe
-    input  wire                built_sine,                      // HAS_SINE
-    input  wire                built_monitor,                   // HAS_MONITOR
-    input  wire                built_harmonics,                 // HAS_HARMONICS
-    input  wire                built_recorder,                  // HAS_RECORDER
-    input  wire                built_capture,                   // HAS_CAPTURE
+    // count of the quadrature decoder [1/4 period]
+    input  wire signed  [31:0] quadrature_count,
+    // strobes: encoder events; each one stays until 1 is written to it
+    input  wire         [ 5:0] encoder_events,
+    // encoder events that are a fault; same bits as encoder_events
+    output logic        [ 5:0] encoder_fault_mask,
+    // strobe: pulses of a, b or z that the filter rejected; writing clears the count, which stops
+    // at its largest value
+    input  wire                rejected_pulses,
+    // strobe: samples that the outlier filter rejected; writing clears the count
+    input  wire                rejected_samples,
+    // HAS_SINE: sine and cosine; 0: the position is made of counts
+    input  wire                built_sine,
+    // HAS_MONITOR: signal monitor, amplitude
+    input  wire                built_monitor,
+    // HAS_HARMONICS: harmonic correction
+    input  wire                built_harmonics,
+    // HAS_RECORDER: recorder of bursts, for the auto-calibration
+    input  wire                built_recorder,
+    // HAS_CAPTURE: queue of captures; 0: one index at a time
+    input  wire                built_capture,
     input  wire                built_compare,                   // HAS_COMPARE: compare pulses
-    input  wire                built_encoder_check,             // HAS_ENCODER_CHECK
+    // HAS_ENCODER_CHECK: check of counts per revolution, count at the index, time of the last edge
+    input  wire                built_encoder_check,
     input  wire                built_velocity,                  // HAS_VELOCITY: measured velocity
-    input  wire                built_drive,                     // HAS_DRIVE
+    // HAS_DRIVE: profile, servo, interlock; 0: the axis only measures
+    input  wire                built_drive,
     input  wire                built_bridge,                    // HAS_BRIDGE: bridge
     input  wire                built_stepper,                   // HAS_STEPPER: step generator
     input  wire                built_dac,                       // HAS_DAC: DAC
     input  wire                built_fine_stage,                // HAS_FINE_STAGE: fine stage
-    input  wire         [ 2:0] built_filters,                   // FILTERS
-    input  wire         [ 7:0] built_segments,                  // SEGMENTS
-    input  wire signed  [31:0] following_error,                 // target - position, 1/65536 period
-    input  wire signed  [15:0] command                          // command to the drive
+    // FILTERS: biquads of the servo; 0: none
+    input  wire         [ 2:0] built_filters,
+    // SEGMENTS: most segments of the table; 0: none
+    input  wire         [ 7:0] built_segments,
+    // target - position, limited to 32 bits [1/65536 period]
+    input  wire signed  [31:0] following_error,
+    // command to the drive, full scale 2^15, after the interlock
+    input  wire signed  [15:0] command
 );
     logic [ 5:0] encoder_events_held;
     logic [15:0] fault_position_high;

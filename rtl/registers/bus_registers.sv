@@ -8,7 +8,7 @@
 //           Its counters are those of event_counters, which is a few cycles late.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
-// made     by tables/registers.py, never by hand
+// made     by tables/registers.py, not to be edited
 `default_nettype none
 
 module bus_registers (
@@ -20,30 +20,46 @@ module bus_registers (
     input  wire  [31:0] wdata,                // value to write
     output logic [31:0] rdata,                // live bits read; else 0
     output logic [19:0] bit_time,             // duration of one bit [1/16 cycle]
-    input  wire  [ 7:0] receive_data,         // oldest received word
+    // oldest received word; reading removes it from the queue: data
+    input  wire  [ 7:0] receive_data,
     input  wire         receive_command,      // 9th bit: the byte is a command for this node
-    input  wire         receive_good,         // last byte of a good frame
+    // last byte of a good frame, whose length and CRC-32 are right
+    input  wire         receive_good,
     input  wire         receive_present,      // 1: a word was read; 0: the queue was empty
     output logic        receive_read,         // strobe: read in this cycle
     output logic [ 7:0] transmit_data,        // word to send; writing puts it into the queue: data
-    output logic        transmit_command,     // word to send
+    // word to send; writing puts it into the queue: command
+    output logic        transmit_command,
     output logic        transmit_written,     // strobe: new value
     input  wire  [ 7:0] state_transmit_free,  // state of the queues: transmit free
     input  wire         state_sending,        // state of the queues: sending
     input  wire         frames_good,          // strobe: good frames; writing clears the count
-    input  wire         frames_bad,           // strobe: bad frames
-    input  wire         framing_errors,       // strobe: characters without a stop bit
-    input  wire         start_glitches,       // strobe: start bits that were only glitches
-    input  wire         overruns,             // strobe
-    output logic [ 7:0] crc_byte_data,        // byte for the CRC-32 of a frame to send
+    // strobe: bad frames, for this node with a wrong CRC-32 or length; writing clears the count
+    input  wire         frames_bad,
+    // strobe: characters without a stop bit; writing clears the count
+    input  wire         framing_errors,
+    // strobe: start bits that were only glitches; writing clears the count
+    input  wire         start_glitches,
+    // strobe: words lost because the receive queue was full; writing clears the count
+    input  wire         overruns,
+    // byte for the CRC-32 of a frame to send; writing adds it to the CRC-32: data
+    output logic [ 7:0] crc_byte_data,
     output logic        crc_byte_written,     // strobe: new value
     output logic        crc_start_start,      // strobe: starts the CRC-32 again: start
-    input  wire  [31:0] crc,                  // CRC-32 of the bytes so far
-    output logic [15:0] watchdog_time,        // 0.001 s
-    input  wire         breaks,               // strobe: breaks
-    input  wire         transmit_timeouts,    // strobe: transmit time-outs
-    input  wire         syncs,                // strobe: sync pulses
-    output logic [ 7:0] sync_axes             // axes that start with sync
+    // CRC-32 of the bytes so far, after the final inversion
+    input  wire  [31:0] crc,
+    // longest silence of the master while a drive is enabled; 0: no limit [0.001 s]
+    output logic [15:0] watchdog_time,
+    // strobe: breaks: the bus was low for 2 ms; writing clears the count
+    input  wire         breaks,
+    // strobe: transmit time-outs: the bus driver was on for 1024 bits and has been cut off; writing
+    // clears the count
+    input  wire         transmit_timeouts,
+    // strobe: sync pulses: good frames for all nodes; writing clears the count
+    input  wire         syncs,
+    // axes that start with sync, bit n: axis n; they play their queued segments from the next sync
+    // pulse on
+    output logic [ 7:0] sync_axes
 );
     logic get_receive;
     logic get_state;

@@ -34,14 +34,14 @@ module event_counters #(
         COUNTERS_MUST_BE_A_POWER_OF_TWO_FROM_2_UP u_error ();
     end
 
-    (* no_rw_check *)logic [W-1:0] memory[0:COUNTERS-1];  // never read where it is written
+    (* no_rw_check *) logic [W-1:0] memory[0:COUNTERS-1];  // never read where it is written
 
     logic [COUNTERS-1:0] waiting;  // an event is not counted yet
-    logic [         A:0] cleared;  // counters that are 0 since rst; then COUNTERS
-    logic                raising;  // count is the one that is raised
-    logic [       A-1:0] raised;  // its counter
+    logic [A:0] cleared;  // counters that are 0 since rst; then COUNTERS
+    logic raising;  // count is the one that is raised
+    logic [A-1:0] raised;  // its counter
 
-    logic [       A-1:0] first;  // the lowest counter of which an event waits
+    logic [A-1:0] first;  // the lowest counter of which an event waits
     always_comb begin
         first = '0;
         for (int n = COUNTERS - 1; n >= 0; n--) if (waiting[n]) first = A'(n);

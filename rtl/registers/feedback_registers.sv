@@ -7,7 +7,7 @@
 // behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
-// made     by tables/registers.py, never by hand
+// made     by tables/registers.py, not to be edited
 `default_nettype none
 
 module feedback_registers #(
@@ -25,91 +25,147 @@ module feedback_registers #(
     input wire [31:0] wdata,  // value to write
     input wire [31:0] wdata_low,  // low word, held by register_memory
     output logic [31:0] rdata,  // live bits read; else 0
-    output logic [15:0] edge_filter_skip,  // cycle
-    output logic [3:0] edge_filter_tolerated,  // tolerated samples
-    output logic [1:0] decoder_mode,  // 0 x4
+    // cycles left out between two samples [cycle]
+    output logic [15:0] edge_filter_skip,
+    // tolerated samples, of the old level: N of N + tolerated must agree
+    output logic [3:0] edge_filter_tolerated,
+    // 0 x4, 1 x2, 2 x1, 3 step and direction; all but x4 need disagreement_limit = 0
+    output logic [1:0] decoder_mode,
     output logic index_active_low,  // 1: the index is active low
-    output logic [1:0] index_gate_mask,  // {b
+    // {b, a}, 1: it must equal gate
+    output logic [1:0] index_gate_mask,
     output logic [1:0] index_gate,  // {b, a}, levels at the index
     output logic index_up,  // 1: use an index going up
     output logic index_down,  // 1: use an index going down
-    output logic index_each,  // 1
-    output logic [31:0] counts_per_revolution,  // edges between two indexes
-    output logic strobes_arm_index,  // strobe: arms the index
-    output logic strobes_load_correction,  // strobe: loads the correction
-    output logic strobes_swap_harmonics,  // strobe
+    // 1: every index; 0: one for each arm_index
+    output logic index_each,
+    // edges between two indexes; 0: not checked
+    output logic [31:0] counts_per_revolution,
+    // strobe: arms the index, so that the next one is used
+    output logic strobes_arm_index,
+    // strobe: loads the correction, that is the four values, for all samples from here on
+    output logic strobes_load_correction,
+    // strobe: uses the new harmonic table, which was written before
+    output logic strobes_swap_harmonics,
     output logic strobes_record,  // strobe: records a new burst
-    output logic strobes_clear_signal_faults,  // strobe
+    // strobe: clears the first signal fault
+    output logic strobes_clear_signal_faults,
     output logic strobes_capture_now,  // strobe: captures now
-    output logic strobes_capture_next,  // strobe
+    // strobe: drops the oldest capture
+    output logic strobes_capture_next,
     output logic strobes_capture_clear,  // strobe: drops all captures
-    output logic strobes_compare_arm,  // strobe
+    // strobe: arms compare at its first point
+    output logic strobes_compare_arm,
     output logic strobes_compare_disarm,  // strobe: disarms compare
-    input wire index_events_found,  // strobe: index events
-    input wire index_events_revolution_wrong,  // strobe
-    input wire index_events_armed,  // index events
-    input wire signed [31:0] index_count,  // 1/4 period
-    input wire [31:0] edge_time,  // cycle
+    // strobe: index events; write 1 to clear: found
+    input wire index_events_found,
+    // strobe: wrong count since the index before, neither 0 nor counts_per_revolution
+    input wire index_events_revolution_wrong,
+    // index events; write 1 to clear: armed
+    input wire index_events_armed,
+    // quadrature count at the last index [1/4 period]
+    input wire signed [31:0] index_count,
+    // time of the last counted edge [cycle]
+    input wire [31:0] edge_time,
     output logic correction_offset_written,  // strobe: new value
     output logic correction_gain_written,  // strobe: new value
     output logic correction_quadrature_error_written,  // strobe: new value
-    output logic harmonic_enable,  // 1
+    // 1: the harmonic table is subtracted
+    output logic harmonic_enable,
     output logic harmonic_point_written,  // strobe: new value
     output logic [15:0] recorder_decimation,  // one sample out of so many
     output logic recorder_phases,  // 1: phases, 0: samples
     input wire recorder_state_full,  // the burst is complete
-    input wire recorder_state_invalid,  // the signal was disturbed
-    input wire [31:0] recorder_word,  // word of the burst
+    // the signal was disturbed, out of its amplitude window or too fast
+    input wire recorder_state_invalid,
+    // word of the burst; reading advances to the next one
+    input wire [31:0] recorder_word,
     output logic recorder_word_read,  // strobe: read in this cycle
     input wire [14:0] signal_faults,  // signal faults present now
     input wire [14:0] first_signal_faults,  // first signal faults
-    output logic [14:0] signal_fault_mask,  // faults that stop the drive
-    output logic [15:0] lissajous_limits_clip_level,  // ADC counts
-    output logic [15:0] lissajous_limits_tolerance,  // ADC counts
-    output logic [15:0] jump_limits_jump,  // ADC counts
-    output logic [15:0] jump_limits_no_noise_samples,  // samples with one code
-    output logic [15:0] channel_limits_span,  // ADC counts
-    output logic [7:0] channel_limits_band,  // ADC counts
-    output logic [15:0] drift_limits_offset,  // ADC counts
-    output logic [15:0] drift_limits_balance,  // ADC counts
-    output logic [15:0] quadrature_limits_quadrature_error,  // ADC counts
-    output logic [15:0] quadrature_limits_sign_threshold,  // ADC counts
-    output logic [6:0] capture_sources,  // sources that capture
+    // faults that stop the drive; bits as in signal_faults
+    output logic [14:0] signal_fault_mask,
+    // ADC counts; clipping and the circle of the signals: clip level
+    output logic [15:0] lissajous_limits_clip_level,
+    // ADC counts; clipping and the circle of the signals: tolerance
+    output logic [15:0] lissajous_limits_tolerance,
+    // ADC counts; jumps and missing noise: jump
+    output logic [15:0] jump_limits_jump,
+    // samples with one code; 0: any number
+    output logic [15:0] jump_limits_no_noise_samples,
+    // ADC counts; a channel that does not change: span
+    output logic [15:0] channel_limits_span,
+    // ADC counts; a channel that does not change: band
+    output logic [7:0] channel_limits_band,
+    // ADC counts; drift of offset and balance: offset
+    output logic [15:0] drift_limits_offset,
+    // ADC counts; drift of offset and balance: balance
+    output logic [15:0] drift_limits_balance,
+    // ADC counts; phase error and comparators: quadrature error
+    output logic [15:0] quadrature_limits_quadrature_error,
+    // ADC counts; phase error and comparators: sign threshold
+    output logic [15:0] quadrature_limits_sign_threshold,
+    // sources that capture; bit 0 index, 1 tick, 2 software or sync pulse, 3 and 4 rising probe 0
+    // and 1, 5 and 6 falling probe 0 and 1
+    output logic [6:0] capture_sources,
     input wire capture_state_present,  // capture waits in captured_*
     input wire [4:0] capture_state_free,  // captures that still fit
-    input wire capture_state_overrun,  // strobe: an event was dropped
+    // strobe: an event was dropped; write 1 to clear
+    input wire capture_state_overrun,
     input wire [6:0] captured_sources,  // oldest capture: sources
-    input wire [15:0] captured_age,  // cycle
-    input wire [31:0] captured_time,  // cycle
-    input wire signed [47:0] captured_position,  // 1/65536 period
-    output logic signed [47:0] compare_start,  // 1/65536 period
-    output logic signed [47:0] compare_step,  // 1/65536 period
+    // time since its position was new [cycle]
+    input wire [15:0] captured_age,
+    // time of the oldest capture [cycle]
+    input wire [31:0] captured_time,
+    // position of the oldest capture [1/65536 period]
+    input wire signed [47:0] captured_position,
+    // first compare point [1/65536 period]
+    output logic signed [47:0] compare_start,
+    // distance between two points; its sign is the direction [1/65536 period]
+    output logic signed [47:0] compare_step,
     output logic [31:0] compare_count,  // number of points; 0: no end
     output logic [23:0] compare_pulse,  // length of a pulse [cycle]
-    output logic [23:0] compare_gap,  // cycle
+    // shortest gap between two pulses [cycle]
+    output logic [23:0] compare_gap,
     input wire compare_state_armed,  // state of compare: armed
-    input wire compare_state_late,  // strobe
-    input wire [31:0] compare_passed,  // points passed
-    output logic position_source_counts,  // 1
-    output logic position_source_steps,  // 1
-    output logic signed [2:0] align,  // 1/4 period
+    // strobe: a pulse had to wait for the one before it; write 1 to clear
+    input wire compare_state_late,
+    // points passed, since compare_arm
+    input wire [31:0] compare_passed,
+    // 1: counts of a and b, 0: phases, if sine and cosine are built; a count is a quarter period
+    output logic position_source_counts,
+    // 1: own steps of the axis replace the pins a and b
+    output logic position_source_steps,
+    // shift of position and phase, -2 to 2 counts, in the mode of counts; the target does not
+    // follow [1/4 period]
+    output logic signed [2:0] align,
     output logic align_written,  // strobe: new value
     output logic segment_use_enable,  // 1: positions are corrected
-    output logic segment_use_linear,  // 1
-    output logic [7:0] segment_use_segments,  // use of the segment table
+    // 1: straight lines between borders; 0: a segment has the mean of its borders
+    output logic segment_use_linear,
+    // use of the segment table; a change moves position and target together: segments
+    output logic [7:0] segment_use_segments,
     input wire segment_state_in_force,  // positions are corrected
-    input wire segment_state_outside,  // beyond the table
-    input wire segment_state_known,  // 1
-    output logic signed [47:0] segment_origin,  // 1/65536 period
+    // beyond the table, where the error of its border is used
+    input wire segment_state_outside,
+    // 1: segment_stored is valid, for the border in segment_read
+    input wire segment_state_known,
+    // position of the first border; it moves with the origin after it is written [1/65536 period]
+    output logic signed [47:0] segment_origin,
     output logic segment_origin_written,  // strobe: new value
-    output logic [47:0] segment_length,  // 1/65536 period
-    output logic signed [23:0] segment_point,  // 1/65536 period
+    // length of a segment [1/65536 period]
+    output logic [47:0] segment_length,
+    // position at a border less the true position, that is its error; writing stores it [1/65536
+    // period]
+    output logic signed [23:0] segment_point,
     output logic [7:0] segment_point_border,  // border of the point
     output logic segment_point_written,  // strobe: new value
     output logic [7:0] segment_read_border,  // border to read back: border
     output logic segment_read_written,  // strobe: new value
-    input wire signed [23:0] segment_stored,  // 1/65536 period
-    input wire signed [23:0] segment_error  // 1/65536 period
+    // error at that border, valid while segment_state.known is 1 [1/65536 period]
+    input wire signed [23:0] segment_stored,
+    // error subtracted from the position now [1/65536 period]
+    input wire signed [23:0] segment_error
 );
     logic        index_events_found_held;
     logic        index_events_revolution_wrong_held;

@@ -6,27 +6,37 @@
 // behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
-// made     by tables/registers.py, never by hand
+// made     by tables/registers.py, not to be edited
 `default_nettype none
 
 module node_registers (
     input  wire         clk,
-    input  wire         rst,                // settings take their first values
-    input  wire         select,             // strobe: access to this block
-    input  wire         write,              // level: it writes wdata
-    input  wire  [ 5:0] word,               // index of the word
-    input  wire  [31:0] wdata,              // value to write
-    output logic [31:0] rdata,              // live bits read; else 0
-    input  wire  [31:0] clk_hz,             // frequency of clk [Hz]
-    input  wire  [ 3:0] build_axes,         // what is built: axes
-    input  wire  [ 3:0] build_address,      // what is built: address
-    input  wire  [ 7:0] build_memory,       // what is built: memory [1024 byte]
-    input  wire  [63:0] time_stamp,         // cycles since reset, cycle
-    output logic [23:0] tick_period,        // period of the servo tick, cycle
-    output logic [15:0] sample_period,      // period of the samples, cycle
-    output logic        heartbeat_kick,     // strobe: heartbeat of the firmware
-    output logic [ 7:0] start_axes,         // axes that start
-    output logic        start_axes_written  // strobe: new value
+    input  wire         rst,                 // settings take their first values
+    input  wire         select,              // strobe: access to this block
+    input  wire         write,               // level: it writes wdata
+    input  wire  [ 5:0] word,                // index of the word
+    input  wire  [31:0] wdata,               // value to write
+    output logic [31:0] rdata,               // live bits read; else 0
+    input  wire  [31:0] clk_hz,              // frequency of clk [Hz]
+    input  wire  [ 3:0] build_axes,          // what is built: axes
+    input  wire  [ 3:0] build_address,       // what is built: address
+    input  wire  [ 7:0] build_memory,        // what is built: memory [1024 byte]
+    // cycles since reset; every time stamp is a part of it [cycle]
+    input  wire  [63:0] time_stamp,
+    // period of the servo tick; it is the same for all axes [cycle]
+    output logic [23:0] tick_period,
+    // period of the samples; it is the same for all ADCs [cycle]
+    output logic [15:0] sample_period,
+    // strobe: heartbeat of the firmware; while a drive is on, the longest time between two is 20 ms
+    // and 1 200 000 cycles: kick
+    output logic        heartbeat_kick,
+    // axes that start, bit n: axis n; they play their queued segments from the same tick on
+    output logic [ 7:0] start_axes,
+    output logic        start_axes_written,  // strobe: new value
+    // longest wait of the soft core; writing lets its next access to a register wait for this time,
+    // or until a word of the bus is received [cycle]
+    output logic [23:0] wait_time,
+    output logic        wait_time_written    // strobe: new value
 );
     logic [31:0] time_stamp_high;
     logic        get_map_crc;
@@ -42,7 +52,7 @@ module node_registers (
     wire         unused = &{1'b0, wdata[31:24]};
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'h49D04E40) | ({32{get_clk_hz}} & clk_hz) |
+    assign rdata = ({32{get_map_crc}} & 32'hBBFAB873) | ({32{get_clk_hz}} & clk_hz) |
         ({32{get_build}} & {16'd0, build_memory, build_address, build_axes}) | ({32{get_time_stamp}}
         & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high);
 
@@ -59,6 +69,8 @@ module node_registers (
         heartbeat_kick <= put && word == 6'h08 && wdata[0];
         start_axes_written <= put && word == 6'h09;
         if (put && word == 6'h09) start_axes <= wdata[7:0];
+        wait_time_written <= put && word == 6'h0A;
+        if (put && word == 6'h0A) wait_time <= wdata[23:0];
 
         if (rst) begin
             get_map_crc <= 1'b0;
@@ -72,6 +84,8 @@ module node_registers (
             heartbeat_kick <= 1'b0;
             start_axes_written <= 1'b0;
             start_axes <= 8'h00;
+            wait_time_written <= 1'b0;
+            wait_time <= 24'h000000;
         end
     end
 endmodule

@@ -7,7 +7,7 @@
 // behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
-// made     by tables/registers.py, never by hand
+// made     by tables/registers.py, not to be edited
 `default_nettype none
 
 module peripherals_registers (
@@ -18,65 +18,97 @@ module peripherals_registers (
     input  wire  [ 5:0] word,                          // index of the word
     input  wire  [31:0] wdata,                         // value to write
     output logic [31:0] rdata,                         // live bits read; else 0
-    input  wire         built_i2c,                     // which peripherals are built
-    input  wire         built_ps2,                     // which peripherals are built
-    input  wire         built_peer,                    // which peripherals are built
-    input  wire         built_sensor,                  // which peripherals are built
-    input  wire         built_display,                 // which peripherals are built
-    input  wire         built_edm,                     // which peripherals are built
+    // which peripherals are built; 0: its pins are idle and its registers do nothing: i2c
+    input  wire         built_i2c,
+    // which peripherals are built; 0: its pins are idle and its registers do nothing: ps2
+    input  wire         built_ps2,
+    // which peripherals are built; 0: its pins are idle and its registers do nothing: peer
+    input  wire         built_peer,
+    // which peripherals are built; 0: its pins are idle and its registers do nothing: sensor
+    input  wire         built_sensor,
+    // which peripherals are built; 0: its pins are idle and its registers do nothing: display
+    input  wire         built_display,
+    // which peripherals are built; 0: its pins are idle and its registers do nothing: edm
+    input  wire         built_edm,
     output logic [ 7:0] i2c_data,                      // byte of a write
-    output logic [ 2:0] i2c_command,                   // 0 start
+    // 0 start, 1 stop, 2 write, 3 read, 4 recover; a start may be repeated, recover clocks a stuck
+    // device free
+    output logic [ 2:0] i2c_command,
     output logic        i2c_acknowledge,               // of a read: more bytes follow
     output logic        i2c_written,                   // strobe: new value
     input  wire  [ 7:0] i2c_answer_data,               // byte of a read
-    input  wire  [ 1:0] i2c_answer_result,             // 0 ok
+    // 0 ok, 1 not acknowledged, 2 bus lost or not owned, 3 no bus; without a bus a line stays low
+    input  wire  [ 1:0] i2c_answer_result,
     input  wire         i2c_answer_present,            // 1: a word was read; 0: the queue was empty
     output logic        i2c_answer_read,               // strobe: read in this cycle
-    input  wire  [ 7:0] i2c_state_free,                // commands that can be queued
+    // commands that can be queued, 128 at most; the queue of results holds as many, more are lost
+    input  wire  [ 7:0] i2c_state_free,
     input  wire         i2c_state_busy,                // a command is in work or waits
-    input  wire         i2c_state_owned,               // the master owns the bus
+    // the master owns the bus, from start to stop
+    input  wire         i2c_state_owned,
     input  wire         i2c_state_scl,                 // level of the line
     input  wire         i2c_state_sda,                 // level of the line
-    output logic [15:0] ps2_idle,                      // 0.001 s
+    // silence of keyboard and machine before an injection; less than 20 acts as 20 [0.001 s]
+    output logic [15:0] ps2_idle,
     output logic [ 7:0] ps2_inject_data,               // scan code
     output logic        ps2_inject_last,               // 1: last one of its sequence
     output logic        ps2_inject_written,            // strobe: new value
     input  wire  [ 5:0] ps2_state_free,                // scan codes that can be queued, 32 at most
     input  wire         ps2_state_injecting,           // a sequence is being injected
     input  wire         ps2_state_busy,                // a frame is on its way on either side
-    output logic        ps2_state_drop,                // strobe: removes what is queued
-    input  wire         ps2_typed,                     // strobe: typed bytes
+    // strobe: removes what is queued; a sequence that has begun is completed
+    output logic        ps2_state_drop,
+    // strobe: typed bytes: they answer no command; writing clears the count
+    input  wire         ps2_typed,
     input  wire         ps2_errors_keyboard_damaged,   // strobe: damaged bytes of the keyboard
     input  wire         ps2_errors_command_damaged,    // strobe: damaged commands of the machine
-    input  wire         ps2_errors_unsent,             // strobe
+    // strobe: commands that the keyboard did not take
+    input  wire         ps2_errors_unsent,
     input  wire         ps2_errors_aborted,            // strobe: frames that the machine cut short
-    input  wire         ps2_glitches,                  // strobe
-    output logic [19:0] peer_bit_time,                 // 1/16 cycle
-    input  wire  [ 7:0] peer_receive_data,             // oldest received byte
+    // strobe: pulses of less than 1 us on the lines; writing clears the count
+    input  wire         ps2_glitches,
+    // duration of one bit of the peer port [1/16 cycle]
+    output logic [19:0] peer_bit_time,
+    // oldest received byte; reading removes it from the queue of 64: data
+    input  wire  [ 7:0] peer_receive_data,
     input  wire         peer_receive_present,          // 1: a word was read; 0: the queue was empty
     output logic        peer_receive_read,             // strobe: read in this cycle
-    output logic [ 7:0] peer_transmit,                 // byte to send
+    // byte to send; writing puts it into the queue
+    output logic [ 7:0] peer_transmit,
     output logic        peer_transmit_written,         // strobe: new value
     input  wire  [ 6:0] peer_state_transmit_free,      // bytes that can be queued, 64 at most
     input  wire         peer_state_sending,            // state of the peer port: sending
     input  wire         peer_errors_framing,           // strobe: characters without a stop bit
-    input  wire         peer_errors_overruns,          // strobe
-    output logic [19:0] sensor_bit_time,               // 1/16 cycle
-    output logic [23:0] sensor_gap,                    // cycle
-    output logic [31:0] sensor_stale_after,            // cycle
-    input  wire  [63:0] sensor_reading,                // last good frame
-    input  wire  [ 7:0] sensor_state_sequence_number,  // its sequence number
-    input  wire         sensor_state_stale,            // stale
+    // strobe: bytes lost because the receive queue was full
+    input  wire         peer_errors_overruns,
+    // duration of one bit of the sensor [1/16 cycle]
+    output logic [19:0] sensor_bit_time,
+    // longest pause between the ends of two bytes of a frame [cycle]
+    output logic [23:0] sensor_gap,
+    // time without a good frame after which the sensor is stale; 0: never [cycle]
+    output logic [31:0] sensor_stale_after,
+    // last good frame; low word: angle, 2^32 per turn; high word: its age at the read in cycles,
+    // which stops at its largest value
+    input  wire  [63:0] sensor_reading,
+    // its sequence number; read it before sensor_reading
+    input  wire  [ 7:0] sensor_state_sequence_number,
+    // stale: no frame yet, or older than sensor_stale_after
+    input  wire         sensor_state_stale,
     input  wire  [ 7:0] sensor_errors_crc,             // frames with a wrong CRC-16
-    input  wire  [ 7:0] sensor_errors_broken,          // broken frames
-    input  wire  [ 7:0] sensor_errors_missed,          // missed frames
+    // broken frames, with a pause or a framing error inside
+    input  wire  [ 7:0] sensor_errors_broken,
+    // missed frames, by the gaps in the sequence numbers; damaged frames are included
+    input  wire  [ 7:0] sensor_errors_missed,
     output logic        sensor_errors_clear,           // strobe: clears the three counts
-    input  wire         sensor_frames,                 // strobe: good frames
-    output logic [15:0] display,                       // word to the display
+    // strobe: good frames; writing clears the count
+    input  wire         sensor_frames,
+    // word to the display: register in the high byte, value in the low one
+    output logic [15:0] display,
     output logic        display_written,               // strobe: new value
     input  wire  [ 4:0] display_state_free,            // words that can be queued, 16 at most
     input  wire         display_state_sending,         // state of the display: sending
-    output logic [15:0] edm_filter,                    // 0.001 s
+    // time that a status input must be stable; the change passes at most 1 ms later [0.001 s]
+    output logic [15:0] edm_filter,
     input  wire  [ 1:0] edm_status_inputs,             // bit n: level of input n
     input  wire         edm_status_rose_0,             // strobe: input 0 went high
     input  wire         edm_status_rose_1,             // strobe: input 1 went high

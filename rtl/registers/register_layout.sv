@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// register_layout -- where each word of the register map is in the register memory, and what a
-// write of it stores there.
+// register_layout -- find the place of a word of the register map in the register memory, and the
+// bits that a write of the word stores there.
 //
 // latency  0 cycles: combinational
 // rate     one word per cycle
@@ -8,7 +8,7 @@
 //          words of the memory, where all values are 0.
 // source   tables/registers.rdl
 // model    tb/registers/register_layout.py, equal for every word
-// made     by tables/registers.py, never by hand
+// made     by tables/registers.py, not to be edited
 `default_nettype none
 
 module register_layout #(
@@ -31,7 +31,7 @@ module register_layout #(
     input wire [13:0] address,  // word of the register map
     input wire [31:0] wdata,  // value to write
     output logic [PLACES+5:0] place,  // word of the register memory
-    output logic [31:0] kept,  // what the write stores: bits of settings, sign-extended
+    output logic [31:0] stored_bits,  // what the write stores: bits of settings, sign-extended
     output logic [31:0] first,  // value after reset
     output logic low,  // level: low word of a setting of 64 bits; it waits for the high word
     output logic high  // level: high word of such a setting; both words are stored
@@ -97,7 +97,7 @@ module register_layout #(
     end
 
     assign place = {slot, word};
-    assign kept  = (wdata & mask) | ({32{sign}} & ~mask);
+    assign stored_bits  = (wdata & mask) | ({32{sign}} & ~mask);
 
     always_comb begin
         case (entry)

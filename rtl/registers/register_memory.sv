@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// register_memory -- holds the settings of all register blocks for reading back, and the low word
+// register_memory -- hold the settings of all register blocks for reading back, and the low word
 // of a setting of 64 bits until its high word is written.
 //
 // latency   1 cycle from select to rdata and to wdata_low; 2048 cycles without hold from the end of
@@ -62,7 +62,7 @@ module register_memory #(
     logic [W-1:0] low_place;
 
     wire  [W-1:0] place;
-    wire [31:0] kept, first;
+    wire [31:0] stored_bits, first;
     wire low, high;
     wire put = select && write;
 
@@ -87,7 +87,7 @@ module register_memory #(
         .address(stored_at),
         .wdata,
         .place,
-        .kept,
+        .stored_bits,
         .first,
         .low,
         .high
@@ -95,12 +95,12 @@ module register_memory #(
 
     assign stores       = ready ? put && !low : !hold;
     assign stored_at    = ready ? address : {3'd0, count[10:0]};
-    assign stored_value = ready ? kept : first;
+    assign stored_value = ready ? stored_bits : first;
 
     wire         store = !ready || commit || (put && !low);
     // of a write and of a read: one port, since a low word is not stored while another is read
     wire [W-1:0] used_place = commit ? low_place : place;
-    wire [ 31:0] stored = !ready ? first : commit ? wdata_low : kept;
+    wire [ 31:0] stored = !ready ? first : commit ? wdata_low : stored_bits;
 
     always_ff @(posedge clk) begin
         if (store) memory[used_place] <= stored;
@@ -126,7 +126,7 @@ module register_memory #(
     logic        fetched;  // rdata is its value
     logic [31:0] value, fetched_value;  // what it reads, what it was when it was read
     wire [W-1:0] observed_place;
-    wire [31:0] observed_kept, observed_first;
+    wire [31:0] observed_bits, observed_first;
     wire observed_low, observed_high;
     register_layout #(
         .AXES             (AXES),
@@ -144,13 +144,13 @@ module register_memory #(
         .HAS_STEPPER      (HAS_STEPPER),
         .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_observed (
-        .address(observed),
+        .address    (observed),
         .wdata,
-        .place  (observed_place),
-        .kept   (observed_kept),
-        .first  (observed_first),
-        .low    (observed_low),
-        .high   (observed_high)
+        .place      (observed_place),
+        .stored_bits(observed_bits),
+        .first      (observed_first),
+        .low        (observed_low),
+        .high       (observed_high)
     );
     wire filled = ready || count[10:0] > observed[10:0];
     always @(posedge clk) begin
@@ -159,7 +159,7 @@ module register_memory #(
         assume (observed < 14'd2048);
         assume (!select || (ready && !commit));
         if (!ready && count[10:0] == observed[10:0]) value <= observed_first;
-        if (put && address == observed && !observed_low) value <= observed_kept;
+        if (put && address == observed && !observed_low) value <= observed_bits;
         if (pending) value <= wdata_low;
         pending <= !rst && observed_low && high && put && address == {observed[13:1], 1'b1};
         if (select && !write) begin

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_bridge -- connects a relay to the bus of its host: a 9-bit UART, the frame check for
-// address 1, and the requests.
+// relay_bridge -- connect a relay to the bus of its host: a 9-bit UART, the frame check for address
+// 1, and the requests.
 //
 // latency  see relay_requests; the answer begins one bit after a request is done
 // rate     one request at a time
 // behaviour  A request is `00 10 0001` with the 9th bit, length 1..LONGEST, body, CRC-32 of all
 //          before, as on the RS-485 bus of the nodes. An answer is `01 10 0001`, length, body,
 //          CRC-32. The bodies are those of relay_requests. A damaged frame has no answer.
-// model    the models of its blocks; proved in motion by tb/system/test_relay.py
+// model    the models of its blocks; tested together by tb/system/test_relay.py
 `default_nettype none
 
 module relay_bridge #(

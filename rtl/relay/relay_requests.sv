@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_requests -- executes the requests of a relay's host and answers them: status, flags, set of
+// relay_requests -- execute the requests of a relay's host and answer them: status, flags, set of
 // coefficients, flash.
 //
 // latency  2 cycles per byte of the request, then 3 cycles to the first byte of the answer; a

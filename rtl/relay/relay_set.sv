@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_set -- receives the settings and coefficients of a relay as bytes, and puts them into use
+// relay_set -- receive the settings and coefficients of a relay as bytes, and put them into use
 // only as a whole.
 //
 // latency  2 cycles from the last byte to good or bad, swap and settings

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_set_source -- selects where a correction set comes from: the flash while it is being read,
+// relay_set_source -- select where a correction set comes from: the flash while it is being read,
 // else the host.
 //
 // latency  0 cycles, combinational

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_status -- collects what the blocks of a relay report, and decides whether it corrects.
+// relay_status -- collect what the blocks of a relay report, and decide whether it corrects.
 //
 // latency  0 cycles, combinational
 // rate     one event of each kind per cycle

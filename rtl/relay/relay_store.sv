@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_store -- reads the set of a relay from an SPI flash at power-up: the first copy, or the
+// relay_store -- read the set of a relay from an SPI flash at power-up: the first copy, or the
 // second one if the first is damaged.
 //
 // latency  2048 + 66 (LENGTH + 5) cycles from reset to the last byte of the first copy; 2048 + 66

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis_inputs -- brings the input pins of an axis into the clock domain, and filters its limit
+// axis_inputs -- bring the input pins of an axis into the clock domain, and filter its limit
 // switches.
 //
 // latency  2 cycles from a pin to its level; as in switch_filter, with 8 periods of limit_tick,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// encoder_events -- collects what the measuring path reports, and makes the encoder fault of it.
+// encoder_events -- collect the events of the measuring path, and derive the encoder fault from
+// them.
 //
 // latency  0 cycles, combinational
 // rate     one event of each kind per cycle

@@ -5,8 +5,8 @@
 // latency  5 cycles from valid to done and the results; 1 cycle from valid to ready
 // rate     one sample per cycle
 // method   A direction is learned when its sector has been crossed from one side to the other and
-//          a sample came within 1/8 of its axis or diagonal: a signal that rests or trembles
-//          teaches nothing. The new value is averaged with the preceding one. Between an axis and
+//          a sample came within 1/8 of its axis or diagonal: nothing is learned from a signal that
+//          rests or trembles. The new value is averaged with the preceding one. Between an axis and
 //          a diagonal the expected length is the straight line from one length to the other.
 // accuracy the expected length is at most 5 % wrong for 5 % offset, 6 % gain error, 4 degrees of
 //          phase error and harmonics of 1 %

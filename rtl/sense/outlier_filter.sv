@@ -41,17 +41,19 @@ module outlier_filter #(
     wire [7:0] sin_held, cos_held;  // samples held back in a row, saturates at 255
     wire signed [W-1:0] sin_last, cos_last;  // last good values
 
-    wire signed [W:0] sin_move = sin - sin_last;
-    wire signed [W:0] cos_move = cos - cos_last;
-    wire [W:0] sin_size = sin_move[W] ? -sin_move : sin_move;
-    wire [W:0] cos_size = cos_move[W] ? -cos_move : cos_move;
+    wire signed [  W:0] sin_move = sin - sin_last;
+    wire signed [  W:0] cos_move = cos - cos_last;
+    wire signed [  W:0] up = $signed({{(W - 7) {1'b0}}, step});
+    wire signed [  W:0] down = -up;
+    wire                sin_far = sin_move > up || sin_move < down;
+    wire                cos_far = cos_move > up || cos_move < down;
 
-    wire active = taken[axis] && step != '0;
-    wire no_end = hold == '1;
-    wire sin_stays = active && sin_size > {{(W - 7) {1'b0}}, step} && (no_end || sin_held < hold);
-    wire cos_stays = active && cos_size > {{(W - 7) {1'b0}}, step} && (no_end || cos_held < hold);
-    wire [7:0] sin_stayed = !sin_stays ? '0 : sin_held == '1 ? sin_held : sin_held + 1'b1;
-    wire [7:0] cos_stayed = !cos_stays ? '0 : cos_held == '1 ? cos_held : cos_held + 1'b1;
+    wire                active = taken[axis] && step != '0;
+    wire                no_end = hold == '1;
+    wire                sin_stays = active && sin_far && (no_end || sin_held < hold);
+    wire                cos_stays = active && cos_far && (no_end || cos_held < hold);
+    wire        [  7:0] sin_stayed = !sin_stays ? '0 : sin_held == '1 ? sin_held : sin_held + 1'b1;
+    wire        [  7:0] cos_stayed = !cos_stays ? '0 : cos_held == '1 ? cos_held : cos_held + 1'b1;
     wire signed [W-1:0] sin_good = sin_stays ? sin_last : sin;
     wire signed [W-1:0] cos_good = cos_stays ? cos_last : cos;
 

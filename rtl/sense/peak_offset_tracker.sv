@@ -11,7 +11,7 @@
 // behaviour S0 gives the magnitude of the offset; its sign is the sign of full - Pmax - Pmin.
 //          Nothing is removed before both turning points of a channel are known. A corrected
 //          sample saturates at full scale.
-// limits   The method learns of a change one fringe late, takes every noisy sample for a turning
+// limits   The method notices a change one fringe late, takes every noisy sample for a turning
 //          point, and cannot correct gain and phase. It serves as a comparison for the
 //          auto-calibration and does not replace it.
 // source   S0, chapter 4.4

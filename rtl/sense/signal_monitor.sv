@@ -11,8 +11,8 @@
 //          14 lost_count: see docs/signal_faults.md. Bits 0, 1, 2, 3 and 7 rise at the second bad
 //          sample within 16 and fall after 16 good ones, so a single spike is not reported. jump:
 //          a channel moves by more than twice the distance of the preceding sample (the larger of
-//          both channels) plus `jump`, which nothing that has mass does; the bit stays until the
-//          next sample. A limit of 65535 switches its check off. first holds all faults of the
+//          both channels) plus `jump`, which no machine can do; the bit stays until the next
+//          sample. A limit of 65535 switches its check off. first holds all faults of the
 //          cycle in which the first one rose.
 // model    tb/sense/signal_monitor.py, equal in every bit of every cycle
 `default_nettype none

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// crc32_stream -- CRC-32 of a stream of bytes, as they come.
+// crc32_stream -- compute the CRC-32 of a stream of bytes, one byte after the other.
 //
 // latency   1 cycle from a byte to crc with 8 BITS, else 8 / BITS + 1
 // rate      one byte per cycle with 8 BITS, else one in 8 / BITS + 1 cycles

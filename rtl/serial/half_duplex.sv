@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// half_duplex -- joins a transmitter and a receiver to one pair of wires: the receiver does not
-// hear what the node sends.
+// half_duplex -- join a transmitter and a receiver to one pair of wires: the receiver does not hear
+// what the node sends.
 //
 // latency  0 cycles, combinational
 // rate     one level per cycle

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// sync_fifo -- first in, first out, in one clock domain. The oldest word is at the output until it
-// is popped.
+// sync_fifo -- queue words in one clock domain, first in, first out. The oldest word is at the
+// output until it is popped.
 //
 // latency   2 cycles from push to present when the queue is empty
 // rate      one push and one pop per cycle
 // method    A ring in a memory with one write port and one clocked read port.
 // model     tb/serial/sync_fifo.py, equal in every bit of every cycle
-// proved    No word is lost, doubled, invented or overtaken. A refused word is reported.
+// proved    No word is lost, duplicated, invented or overtaken. A refused word is reported.
 `default_nettype none
 
 module sync_fifo #(

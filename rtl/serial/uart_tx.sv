@@ -48,7 +48,9 @@ module uart_tx #(
     logic   [ 9:0] shifted;  // the bits to come, the next one lowest
 
     wire    [19:0] whole = |bit_time[19:7] ? bit_time : 20'd128;
-    wire           now = left < 20'd16;
+    // Less than a cycle is left: the bit ends. A flip-flop, since it decides about the next
+    // character; a new bit is always longer than a cycle.
+    logic          now;
 
     wire           begins = state == LEAD && now;
     wire           goes_on = state == SEND && now && to_come == 4'd0;
@@ -64,6 +66,7 @@ module uart_tx #(
         else if (state == SEND && ready)
             left <= valid ? left - 20'd16 + whole : left + {1'b0, whole[19:1]};
         else left <= left - 20'd16 + whole;
+        now <= state != IDLE && !now && left < 20'd32 && !(state == TRAIL && valid);
 
         if (valid && ready) begin
             tx      <= 1'b0;
@@ -99,6 +102,7 @@ module uart_tx #(
             if (!driver_enable) assert (tx);
             if (state != SEND) assert (tx);
             if (state == SEND) assert (to_come <= STOP);
+            if (state != IDLE) assert (now == (left < 20'd16));
             cover (state == SEND);
         end
     end

@@ -14,7 +14,6 @@ from markupsafe import Markup
 
 from moire.analysis import report
 
-ROOT = Path(__file__).resolve().parents[2]
 TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).with_name("templates")),
     autoescape=True,

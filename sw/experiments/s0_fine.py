@@ -26,13 +26,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.report_page import ROOT
-from experiments.s0_stage import ADDRESSES, POLL_S, Stage, random_moves, table
+from experiments.s0_stage import ADDRESSES, LEFT_OUT, POLL_S, Stage, random_moves, table
 from moire.analysis import report
 from moire.client.bus import Bus
 from moire.client.records import CalibrationState
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport
+from twin.build import ROOT
 from twin.machines.machine import MachineHandle, Trace
 from twin.nodes.twin import drives
 
@@ -212,6 +212,7 @@ def run(
             ),
             "simulated time": f"{stage.bus.transport.now():.2f} s",
             "wall time": f"{time.perf_counter() - began:.1f} s",
+            "what the model leaves out": LEFT_OUT,
             "again": f"build/venv/bin/python -m experiments.s0_fine --seed {seed} --moves {count}",
         },
     )

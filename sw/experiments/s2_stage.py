@@ -26,7 +26,7 @@ from typing import Self
 from rich.console import Console
 from rich.table import Table
 
-from experiments.report_page import ROOT, page, picture
+from experiments.report_page import page, picture
 from moire.analysis import report
 from moire.client.axis import Axis as ClientAxis
 from moire.client.bus import Bus
@@ -34,6 +34,7 @@ from moire.client.records import Status
 from moire.errors import MoireError
 from moire.units import Value
 from twin import BuildError, Twin, TwinTransport
+from twin.build import ROOT
 from twin.nodes.twin import Axis, Node, drives
 
 CLK_HZ = 4_800_000  # the motion engine needs 1171 cycles a tick for three axes
@@ -429,12 +430,14 @@ def run(
         "indicates only the direction of the last pulse. The position of the node has 48 bits and "
         "a sign.",
         [
-            report.table(("", "paper", "here", ""), compared),
+            report.table(report.AGAINST_THE_PAPER, compared),
             pictures(stage),
             report.table(HEAD, rows(made), text_columns=2),
         ],
         {
             "simulated time": f"{stage.bus.transport.now():.1f} s",
+            "what the model leaves out": "errors of the scales and of their edges, noise on the "
+            "levels, temperature",
             "again": f"build/venv/bin/python -m experiments.s2_stage --seed {seed}",
         },
     )

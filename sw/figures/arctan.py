@@ -6,9 +6,9 @@ large it becomes.
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, console
+from figures.common import Figure, Quick, console
 from figures.synthesis import ELABORATED, elaborated, source_of, synthesise
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 ARCTAN = ROOT / "rtl" / "interpolate" / "arctan_pipelined.sv"
 SWEEP = Path(__file__).with_name("arctan_sweep.cpp")
@@ -17,8 +17,8 @@ SEED = 1  # of the placement; not picked, others are within 5 % of it
 
 def worst(w: int, least: float) -> float:
     """LSB, over every sample whose radius is at least this share of full scale."""
-    told = run([simulation(SWEEP, ARCTAN, W=w), w, least], "arctan sweep").split()
-    pairs, lsb, wrong, counts = told
+    printed = run([simulation(SWEEP, ARCTAN, W=w), w, least], "arctan sweep").split()
+    pairs, lsb, wrong, counts = printed
     console.print(
         f"{pairs} samples of {w} bits: {wrong} not correctly rounded, "
         f"amplitude within {counts} counts"

@@ -44,6 +44,7 @@ STEP_AXES: Parameters = {
     "HAS_BRIDGE": 0,
     "HAS_STEPPER": ALL_AXES,
     "HAS_DAC": 0,
+    "MEMORY_BYTES": 65536,  # of the image `steps`
 }
 # sine and cosine with correction and harmonics, PWM and DAC
 SINE_AXES: Parameters = {
@@ -56,6 +57,7 @@ SINE_AXES: Parameters = {
     "HAS_STEPPER": 0,
     "HAS_DAC": ALL_AXES,
     "HAS_FINE_STAGE": 0,
+    "MEMORY_BYTES": 98304,  # of the image `axis`
 }
 S0_NODE: Parameters = {
     "CLK_HZ": 60_000_000,

@@ -13,17 +13,19 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, bar, console, shares
+from campaigns.campaign import Campaign, Counts
+from figures.common import Figure, Quick, bar, console, shares
 from moire.bus.protocol import parse_reply, read_words
 from moire.client.bus import Bus
 from moire.errors import BusError
 from twin import Node, Twin, TwinTransport
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 RTL = ROOT / "rtl" / "rs485_port.sv"
 DRIVER = Path(__file__).with_name("bus_run.cpp")
 FRAMES = 10  # that bus_run knows
 RANDOM = 10**6
+FRAMES_A_PART = 10**5  # of the campaign
 DISTURBANCES = 10**5
 SHARE = 10_000  # of one run, each with a seed of its own
 BIT_CYCLES = (16, 17.36, 20, 20.83, 34.72)  # 20: 3 Mbaud at 60 MHz, 20.83: 115200 at 2.4 MHz
@@ -41,6 +43,11 @@ def program() -> Path:
     return simulation(DRIVER, RTL, firmware="axis", CLK_HZ=1_843_000)
 
 
+def numbers_of(*arguments: str | float) -> list[float]:
+    """What a run of bus_run prints."""
+    return [float(word) for word in run([program(), *arguments], "bus_run").split()]
+
+
 def together(runs: Sequence[Run]) -> list[list[float]]:
     """What each run of bus_run prints, as numbers; as many at once as there are processors."""
     program()
@@ -48,9 +55,9 @@ def together(runs: Sequence[Run]) -> list[list[float]]:
         task = progress.add_task("", total=len(runs))
 
         def measure(arguments: Run) -> list[float]:
-            printed = run([program(), *arguments], "bus_run").split()
+            numbers = numbers_of(*arguments)
             progress.advance(task)
-            return [float(word) for word in printed]
+            return numbers
 
         return list(pool.map(measure, runs))
 
@@ -180,4 +187,33 @@ FIGURES = {
         1,
     ),
 }
-SOAK = {"line": lambda: (wrong := wrong_of(random_runs(10**9)), wrong == 0)}
+
+
+def disturbed_frames(part: int, seed: int) -> Counts:
+    """Half of the frames are damaged and must not be accepted; each of the other half follows a
+    disturbance and must be answered.
+    """
+    half = FRAMES_A_PART // 2
+    damaged, accepted, missed = numbers_of("random", half, seed)
+    disturbed, refused = numbers_of("disturb", half, seed)
+    return {
+        "frames": damaged + disturbed,
+        "failures": accepted + missed + refused,
+        "damaged frames": damaged,
+        "damaged frames accepted": accepted,
+        "good frames between them refused": missed,
+        "disturbances": disturbed,
+        "good exchanges after them refused": refused,
+    }
+
+
+CAMPAIGNS = {
+    "line": Campaign(
+        "frames on the RS-485 bus under disturbance, into RTL and firmware; failed: damaged ones "
+        "accepted, good ones refused",
+        disturbed_frames,
+        parts=10_000,
+        tried="frames",
+        failed="failures",
+    )
+}

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from rich.progress import Progress
 
-from figures.common import SEEDS_APART, Figure, Quick, bar, console
+from campaigns.campaign import SEEDS_APART, Campaign, Counts
+from figures.common import Figure, Quick, bar, console
 from moire.client.axis import CORRECTION
 from moire.client.bus import Bus
 from moire.client.records import CalibrationState
@@ -261,21 +262,50 @@ def sde_nm_max(
     return float(left.max())
 
 
-def sde_soak() -> tuple[str, bool]:
-    """Every 20 Hz from 20 to 2000 Hz, each amplitude."""
-    settings = [
-        (hz, amplitude, 100 + n)
-        for hz in range(20, 2001, 20)
-        for n, amplitude in enumerate(AMPLITUDES)
-    ]
-    with bar("calibrations") as progress:
-        left, *_ = sde(settings, progress)
-    above = left > 0.1
+TONES, TONES_HZ, TONES_NM = 40, (20, 500), 7  # nm rms of all together
+BROADBAND_FRINGES = 5000
+BROADBAND_AMPLITUDES = (0.6, 0.9)
+BROADBAND_SIGNALS = 36
+
+
+def broadband(seed: int, fringes: float = BROADBAND_FRINGES) -> tuple[CalibrationRun, float, float]:
+    """A calibration under tones at random frequencies: (calibration, nm left, amplitude). What
+    would leave the range of the ADC is clipped, as there.
+    """
+    draw = np.random.default_rng(seed)
+    tones, amplitude = draw.uniform(*TONES_HZ, TONES), draw.uniform(*BROADBAND_AMPLITUDES)
+    each = TONES_NM * np.sqrt(2 / TONES)
+    machine, _, _, curve = calibrated(seed, tones, each, fringes=fringes, amplitude=amplitude)
+    return machine, remaining_nm(machine.values, machine.table, curve, amplitude), amplitude
+
+
+def sde_broadband_nm(count: int = BROADBAND_SIGNALS, seed: int = 1) -> float:
+    left, missing = [], 0
+    with bar("calibrations under broadband vibration") as progress:
+        for n in progress.track(range(count)):
+            machine, nm, _ = broadband((seed - 1) * SEEDS_APART + n + 1)
+            missing += not machine.calibration.complete
+            left.append(nm)
     console.print(
-        f"{len(left)} signals: worst {left.max():.3f} nm at {settings[left.argmax()]}, "
-        f"median {np.median(left):.3f}, above 0.1 nm: {above.sum()}"
+        f"{count} signals: {count - missing} calibrated; left max {max(left):.3f} nm, "
+        f"median {np.median(left):.3f} nm"
     )
-    return f"{left.max():.3f} nm, {above.sum()} of {len(left)} above 0.1", above.mean() <= 0.01
+    return float(max(left))
+
+
+CAMPAIGN_SIGNALS = [(hz, amplitude) for hz in range(20, 2001, 20) for amplitude in AMPLITUDES]
+
+
+def sde_of_part(part: int, seed: int) -> Counts:
+    hz, amplitude = CAMPAIGN_SIGNALS[part]
+    machine, _, _, curve = calibrated(seed, hz, amplitude=amplitude)
+    left = remaining_nm(machine.values, machine.table, curve, amplitude)
+    return {
+        "signals": 1,
+        "above 0.1 nm": left > 0.1,
+        "not complete": not machine.calibration.complete,
+        "nm left": left,
+    }
 
 
 HARMONICS_OF_TWIN = {
@@ -415,11 +445,21 @@ FIGURES = {
         "nm",
         "largest sub-division error of the test signal (8-bit ADC, 0.5 LSB of noise) after 610 "
         "fringes with one pure tone of 20 nm of vibration at 20 to 2000 Hz, amplitude 60, 75 and "
-        "88 % of full scale, worst of 54; with several tones at once the calibration mostly does "
-        "not complete",
+        "88 % of full scale, worst of 54; several tones at once need a longer pass "
+        "(sde_broadband_nm)",
         "<= 0.1",
         Quick({"vibrations_hz": (0, 87), "amplitudes": (0.75,)}, "two signals", "<= 0.15"),
         note="ellipse correction alone 3.9",
+    ),
+    "sde_broadband_nm": Figure(
+        sde_broadband_nm,
+        "nm",
+        "largest sub-division error of the same test signal after 5000 fringes under 40 tones "
+        "from 20 to 500 Hz, 7 nm rms together, amplitude 60 to 90 % of full scale, worst of 36",
+        "<= 0.3",
+        Quick({"count": 2}, "two signals"),
+        3,
+        "ellipse correction alone 4.7",
     ),
     "acquire_nm_p95_64": Figure(
         acquire_nm_p95_64,
@@ -447,4 +487,15 @@ FIGURES = {
     ),
 }
 
-SOAK = {"sde_nm_max": sde_soak}
+CAMPAIGNS = {
+    "sde": Campaign(
+        "calibrations of the test signal with a tone of 20 nm, every 20 Hz up to 2000 Hz at each "
+        "amplitude; failed: more than 0.1 nm is left, which 1 % may",
+        sde_of_part,
+        parts=len(CAMPAIGN_SIGNALS),
+        tried="signals",
+        failed="above 0.1 nm",
+        largest=("nm left",),
+        allowed=0.01,
+    )
+}

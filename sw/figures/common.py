@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a figure is, and how the modules of this directory find and measure theirs.
 
-A module that measures has a dictionary FIGURES = {name: Figure}; SOAK = {name: function} holds the
-campaigns that take a night. Both are found by name: a new module needs no registration.
+A module that measures has a dictionary FIGURES = {name: Figure}; CAMPAIGNS = {name: Campaign} holds
+its long tests (campaigns/campaign.py). Both are found by name: a new module needs no registration.
 """
 
 import inspect
@@ -18,20 +18,18 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from campaigns.campaign import seeds as seeds
+
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
 TOOLS = {  # modules here that measure nothing
     "__init__",
     "common",
     "comparison",
     "figure",
     "record",
-    "soak",
     "synthesis",
 }
 COMPARISONS = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
-SEEDS_APART = 10**6  # more than any figure has runs
-
 console = Console(stderr=True)  # facts and progress; the figure itself goes to standard output
 
 
@@ -78,7 +76,7 @@ class Figure:
         return "seed" in inspect.signature(self.measure).parameters
 
     @property
-    def wanted(self) -> str:
+    def bound_words(self) -> str:
         return f"{self.bound} ({self.note})" if self.note else self.bound
 
     def good(self, value: float) -> bool:
@@ -94,12 +92,6 @@ class Figure:
         """Whether a measured value is a number, and within the bound of the form that was run."""
         bound = self.quick.bound if quick and self.quick.bound is not None else self.bound
         return math.isfinite(value) and (not bound or within(value, bound))
-
-
-def seeds(seed: int, count: int) -> range:
-    """Seeds of so many runs: 1, 2, 3 … for the seed 1, and others for every other seed."""
-    first = (seed - 1) * SEEDS_APART + 1
-    return range(first, first + count)
 
 
 def shares(total: int, share: int, seed: int) -> Iterator[tuple[int, int]]:
@@ -126,9 +118,3 @@ def collected(attribute: str) -> dict[str, Any]:
     for module in modules():
         found |= getattr(import_module(f"figures.{module}"), attribute, {})
     return found
-
-
-def soaked(figure: Figure, *arguments: Any) -> tuple[float, bool]:
-    """Result of a campaign that is a figure with more of everything."""
-    value = figure.measure(*arguments)
-    return value, figure.good(value)

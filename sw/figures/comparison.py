@@ -107,7 +107,7 @@ def bars(figure: Figure, value: float, comparison: Comparison) -> tuple[Markup, 
 
 def row(result: Result) -> dict[str, str]:
     name, figure, value, took = result
-    made = {"name": name, "what": figure.what, "bound": figure.wanted}
+    made = {"name": name, "what": figure.what, "bound": figure.bound_words}
     if value is None:
         return {**made, "value": f"failed: {took}", "kind": "bad", "took": ""}
     kind = "good" if figure.good(value) else "bad"

@@ -32,10 +32,10 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from figures.common import ROOT, Figure, Quick, bar, console
+from figures.common import Figure, Quick, bar, console
 from moire.made.bus_tables import SIGNAL_FAULTS
 from twin import BuildError
-from twin.build import simulation
+from twin.build import ROOT, simulation
 
 DRIVER = Path(__file__).with_name("faults_run.cpp")
 MONITOR = ROOT / "rtl" / "sense" / "signal_monitor.sv"

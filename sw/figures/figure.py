@@ -22,12 +22,12 @@ from importlib import import_module
 from multiprocessing import get_context
 
 from figures import record
-from figures.common import ROOT, Figure, collected, console, modules
+from figures.common import Figure, collected, console, modules
 from figures.comparison import page
 from figures.synthesis import SynthesisError
 from moire.errors import MoireError
 from twin import BuildError
-from twin.build import SHORT_RUNS
+from twin.build import ROOT, SHORT_RUNS
 
 PAGE = ROOT / "build" / "report" / "figures.html"
 PROCESSES = 2
@@ -67,7 +67,7 @@ def measure(name: str, figure: Figure, quick: bool, seed: int | None) -> Outcome
 
 
 def measure_module(module: str, seed: int | None) -> list[Outcome]:
-    """Short forms of all figures of a module, in a process of its own; what they say is kept."""
+    """Short forms of all figures of a module, in a process of its own; what they print is kept."""
     outcomes = []
     for name, figure in import_module(f"figures.{module}").FIGURES.items():
         console.file = io.StringIO()
@@ -102,7 +102,7 @@ def report(outcome: Outcome, figure: Figure, quick: bool) -> bool:
         console.print(outcome.facts, markup=False, highlight=False)
         print(f"{outcome.name}: {outcome.error}", file=sys.stderr, flush=True)
         return False
-    bound = figure.quick.bound if quick and figure.quick.bound is not None else figure.wanted
+    bound = figure.quick.bound if quick and figure.quick.bound is not None else figure.bound_words
     passes = figure.passes(outcome.value, quick)
     if not passes:
         console.print(outcome.facts, markup=False, highlight=False)
@@ -149,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.list:
         for name, figure in figures.items():
-            print(f"{name:24} {figure.what}; bound: {figure.wanted}")
+            print(f"{name:24} {figure.what}; bound: {figure.bound_words}")
         return 0
     if unknown := [name for name in options.names if name not in figures]:
         parser.error(f"there is no figure {unknown[0]}: there are {', '.join(figures)}")

@@ -8,23 +8,28 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import serial
 
-from figures.common import ROOT, Figure, Quick, console
+from campaigns.campaign import Campaign, Counts
+from figures.common import Figure, Quick, console
 from firmware import build as firmware_build
 from fuzz import parser_fuzz
 from moire.bus import cobs
 from moire.bus.protocol import parse_reply, request_body
 from moire.errors import MoireError
+from twin import build
+from twin.build import ROOT
 
 FIRMWARE = ROOT / "sw" / "firmware"
+FUZZER = ROOT / "sw" / "fuzz" / "firmware_fuzz.c"
+C_FILES = (".c", ".h")
 READ_S = 10
 START_S = 3  # of reads that do not count: the firmware starts, and loads its tables
 FUZZ_S = 600
@@ -96,7 +101,7 @@ def build_firmware_fuzz(folder: Path, image: str, firmware: Path = FIRMWARE) -> 
     traced = ["-Dmain=firmware_main", "-fsanitize-coverage=trace-pc"]
     tools = firmware_build
     sources = [path for path in tools.sources_of(image, Path(firmware)) if path.suffix == ".c"]
-    jobs = [(path, traced) for path in sources] + [(ROOT / "sw" / "fuzz" / "firmware_fuzz.c", [])]
+    jobs = [(path, traced) for path in sources] + [(FUZZER, [])]
     objects = []
     for path, more in jobs:
         objects.append(folder / f"{path.stem}.o")
@@ -127,20 +132,29 @@ class Outcome(NamedTuple):
     crash: str | None  # words of a sanitizer, or about an input that took too long
 
 
+def firmware_fuzzer(image: str, firmware: Path = FIRMWARE) -> Path:
+    """The program of build_firmware_fuzz, built once."""
+    files = [FUZZER, *sorted(path for path in Path(firmware).rglob("*") if path.suffix in C_FILES)]
+    folder = ROOT / "build" / "fuzz" / f"{image}-{build.digest(files, SANITIZED)}"
+
+    def make(making: Path) -> None:
+        build_firmware_fuzz(making, image, firmware)
+
+    return build.made_once(folder, "fuzz", make)
+
+
 def fuzz_firmware(seconds: float, image: str, seed: int = 1, firmware: Path = FIRMWARE) -> Outcome:
-    with tempfile.TemporaryDirectory() as folder:
-        program = build_firmware_fuzz(Path(folder), image, firmware)
-        done = subprocess.run(
-            [program, str(seconds), str(seed)],
-            capture_output=True,
-            text=True,
-            check=False,
-            env={
-                **os.environ,
-                "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1",
-                "UBSAN_OPTIONS": "abort_on_error=1",
-            },
-        )
+    done = subprocess.run(
+        [firmware_fuzzer(image, firmware), str(seconds), str(seed)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={
+            **os.environ,
+            "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1",
+            "UBSAN_OPTIONS": "abort_on_error=1",
+        },
+    )
     if done.returncode:
         return Outcome(image, 0, 0, 0, done.stderr)
     runs, edges, corpus = map(int, done.stdout.split())
@@ -196,4 +210,50 @@ FIGURES = {
         0,
     ),
 }
-SOAK = {"parsers": lambda: (crashes := host_parser_crashes(24 * 3600), crashes == 0)}
+
+
+# ------------------------------------------------------------------ the campaigns
+
+PART_S = 86.4  # 1000 parts are 24 hours of a core for each parser
+
+
+def fuzz_parser(name: str, part: int, seed: int) -> Counts:
+    """In a process of its own: its clock needs the signals of the main thread."""
+    command = [sys.executable, "-m", "fuzz.parser_fuzz", PART_S, seed, "--parser", name, "--json"]
+    (found,) = json.loads(build.run(command, "parser_fuzz"))
+    crashes = found["crashes"]
+    counts = {"inputs": found["runs"], "crashes": len(crashes), "core-hours": PART_S / 3600}
+    words = "\n".join(f"{where}: {data}" for where, data in crashes.items())
+    return {**counts, "largest corpus": found["corpus"], **({"input": words} if words else {})}
+
+
+def fuzz_image(name: str, part: int, seed: int) -> Counts:
+    found = fuzz_firmware(PART_S, name, seed)
+    crashed = found.crash is not None
+    # A fuzzer that is ended by a crash does not say how many inputs came before it.
+    counts = {"inputs": found.runs + crashed, "crashes": crashed, "core-hours": PART_S / 3600}
+    words = {"input": found.crash} if found.crash is not None else {}
+    return {**counts, "largest corpus": found.corpus, **words}
+
+
+def fuzzing(what: str, run: Callable[[int, int], Counts]) -> Campaign:
+    return Campaign(what, run, 1000, "inputs", "crashes", ("largest corpus",))
+
+
+CAMPAIGNS = {
+    **{
+        f"fuzz_{parse.__name__}": fuzzing(
+            f"inputs of the host's parser {parse.__name__}, guided by coverage; failed: crashes",
+            partial(fuzz_parser, parse.__name__),
+        )
+        for parse in parser_fuzz.SEEDS
+    },
+    **{
+        f"fuzz_firmware_{name}": fuzzing(
+            f"scripts of bus, files and power cuts into the firmware image {name} under "
+            "sanitizers, guided by coverage; failed: crashes",
+            partial(fuzz_image, name),
+        )
+        for name in images()
+    },
+}

@@ -4,23 +4,28 @@ on, or report a wrong cause or position afterwards.
 
 Most faults are injected into the Verilated axis, whose registers are driven over its bus
 (interlock_run.cpp); some into the whole node with its firmware, in the twin, where a person at the
-host resets them; and some stop the soft core itself. The campaign of 10^6 faults of the axis is
-`make soak K=guard`.
+host resets them; and some stop the soft core itself. The campaigns of 10^6 faults of the axis and
+of 10^4 of each machine are `make soak K="guard_axis guard_s0 guard_s2 guard_s3 guard_core"`.
 """
 
 import random
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from figures.common import ROOT, Figure, Quick, bar, console, shares
+from campaigns.campaign import Campaign, Counts
+from experiments import s2_stage, s3_zero
+from figures.common import Figure, Quick, bar, console, shares
 from firmware import build as firmware_build
 from moire import Bus
 from moire.client.axis import Axis as BusAxis
 from moire.errors import BusError, Refused
 from twin import Axis, Node, Twin, TwinTransport, build
+from twin.build import ROOT
 
 DRIVER = Path(__file__).with_name("interlock_run.cpp")
 BENCH = Path(__file__).with_name("one_axis_bench.sv")
@@ -35,7 +40,6 @@ CORE_SILENCE_S = 0.02 + 1_200_000 / CLK_HZ  # the node's watchdog of its soft co
 ROUND_S = 0.005  # a request on the bus, and the round of the firmware that finds it
 # nm between the position reported last and the latched one: a cut signal has any phase
 FORGIVEN_NM = {"encoder_cut": 400}
-HELD_NM = 100  # while the axis holds and its scale is sound
 CAUSES = {
     "estop": "estop",
     "limit_low": "limit_low",
@@ -52,21 +56,26 @@ INSTRUCTIONS = {"hang": 0x0000006F, "trap": 0x00000000}  # jump to itself; none 
 # ------------------------------------------------------------------ the axis
 
 
+def interlock_run(count: int, seed: int) -> dict[str, int]:
+    """What the program counts over so many faults, {name: number}."""
+    words = build.run([build.simulation(DRIVER, BENCH), count, seed], "interlock_run").split()
+    return dict(zip(words[1::2], map(int, words[::2])))
+
+
 def axis_faults(
     count: int, seed: int = 1, done: Callable[[int], None] = lambda n: None
 ) -> dict[str, int]:
     """{name: number} over so many faults of the axis: faults, failures, and those of each cause."""
-    program = build.simulation(DRIVER, BENCH)
     totals: dict[str, int] = {}
 
-    def run(share: tuple[int, int]) -> Iterator[tuple[str, int]]:
-        words = build.run([program, *share], "interlock_run").split()
+    def run(share: tuple[int, int]) -> dict[str, int]:
+        counts = interlock_run(*share)
         done(share[0])
-        return zip(words[1::2], map(int, words[::2]))
+        return counts
 
     with ThreadPoolExecutor(2) as pool:
         for counts in pool.map(run, shares(count, SHARE, seed)):
-            for name, value in counts:
+            for name, value in counts.items():
                 totals[name] = totals.get(name, 0) + value
     return totals
 
@@ -91,6 +100,42 @@ def powered_up(
     return twin, axis
 
 
+Powered = tuple[Twin, BusAxis]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine whose first axis gets faults."""
+
+    power_up: Callable[[random.Random], Powered]  # the drive on
+    faults: Sequence[str]  # names of CAUSES; without a sine signal a cut at standstill is not seen
+    held_nm: float  # that the axis moves at most while it holds and its scale is sound
+
+
+def on(stage: Twin, axis: BusAxis) -> Powered:
+    axis.enable()
+    return stage, axis
+
+
+def s2(source: random.Random) -> Powered:
+    stage = s2_stage.Stage.power_up(source.randrange(1 << 31))
+    return on(stage.twin, stage.axes["X"])
+
+
+def s3(source: random.Random) -> Powered:
+    motor = s3_zero.Motor(source.randrange(1 << 31))
+    return on(motor.twin, motor.axis)
+
+
+WITHOUT_CUT = [name for name in CAUSES if name != "encoder_cut"]
+S0 = Machine(powered_up, list(CAUSES), 100)
+MACHINES = {
+    "s0": S0,
+    "s2": Machine(s2, WITHOUT_CUT, 500),
+    "s3": Machine(s3, WITHOUT_CUT, 1000),
+}
+
+
 def refused(request: Callable[[], object], cause: str) -> bool:
     try:
         request()
@@ -99,7 +144,9 @@ def refused(request: Callable[[], object], cause: str) -> bool:
     return False
 
 
-def node_fault(twin: Twin, axis: BusAxis, fault: str, source: random.Random) -> str | None:
+def node_fault(
+    twin: Twin, axis: BusAxis, fault: str, source: random.Random, held_nm: float = S0.held_nm
+) -> str | None:
     """What was wrong with one fault, None if nothing was: the drive must be off in time, cause and
     position must be right, and only a person may enable the drive again.
     """
@@ -122,7 +169,7 @@ def node_fault(twin: Twin, axis: BusAxis, fault: str, source: random.Random) -> 
     if status.first_fault != (CAUSES[fault],):
         return f"reported as {status.first_fault}"
     off_nm = abs(axis.encoder().fault_position_nm - before.position_nm)
-    if off_nm > FORGIVEN_NM.get(fault, HELD_NM):
+    if off_nm > FORGIVEN_NM.get(fault, held_nm):
         return f"latched position {off_nm:.0f} nm off"
     if not refused(axis.enable, "faulted"):
         return "enabled with a fault latched"
@@ -140,18 +187,22 @@ def node_fault(twin: Twin, axis: BusAxis, fault: str, source: random.Random) -> 
     return None
 
 
-def node_faults(count: int, seed: int, done: Callable[[int], None]) -> list[str]:
+def node_faults(
+    count: int, seed: int, done: Callable[[int], None] = lambda n: None, machine: Machine = S0
+) -> list[str]:
     """Sentences about faults of the node that went wrong."""
     source, wrong = random.Random(seed), []
-    twin, axis = powered_up(source)
+    twin, axis = machine.power_up(source)
     axis.set_parameter("watchdog_time", WATCHDOG_S)
     for n in range(count):
-        fault = list(CAUSES)[n % len(CAUSES)]
-        if sentence := node_fault(twin, axis, fault, source):
+        fault = machine.faults[(seed + n) % len(machine.faults)]
+        if sentence := node_fault(twin, axis, fault, source, machine.held_nm):
             wrong.append(f"{fault} at {twin.time():.3f} s: {sentence}")
-            twin, axis = powered_up(source)
+            twin.close()
+            twin, axis = machine.power_up(source)
             axis.set_parameter("watchdog_time", WATCHDOG_S)
         done(1)
+    twin.close()
     return wrong
 
 
@@ -195,7 +246,7 @@ def answers(axis: BusAxis, operation: str, **fields: Any) -> bool:
     return True
 
 
-def core_faults(count: int, seed: int, done: Callable[[int], None]) -> list[str]:
+def core_faults(count: int, seed: int, done: Callable[[int], None] = lambda n: None) -> list[str]:
     source, wrong = random.Random(seed), []
     images = {kind: spoilt_firmware(instruction) for kind, instruction in INSTRUCTIONS.items()}
     for n in range(count):
@@ -227,11 +278,6 @@ def guard_failures(
     return float(totals["failures"] + len(wrong))
 
 
-def soak() -> tuple[dict[str, int], bool]:
-    totals = axis_faults(10**6)
-    return totals, totals["failures"] == 0
-
-
 FIGURES = {
     "guard_failures": Figure(
         guard_failures,
@@ -244,4 +290,38 @@ FIGURES = {
     ),
 }
 
-SOAK = {"guard": soak}
+FAULTS_A_PART = 10  # of a machine
+
+
+def judged(wrong: Sequence[str]) -> Counts:
+    words = {"what": "\n".join(wrong)} if wrong else {}
+    return {"faults": FAULTS_A_PART, "failures": len(wrong), **words}
+
+
+def faults_of_machine(name: str, part: int, seed: int) -> Counts:
+    return judged(node_faults(FAULTS_A_PART, seed, machine=MACHINES[name]))
+
+
+def faults_of_core(part: int, seed: int) -> Counts:
+    return judged(core_faults(FAULTS_A_PART, seed))
+
+
+def guard(what: str, run: Callable[[int, int], Counts]) -> Campaign:
+    failed = "drive not off in time, wrong first cause or position, or reset without a person"
+    return Campaign(f"{what}; failed: {failed}", run, 1000, "faults", "failures")
+
+
+CAMPAIGNS = {
+    "guard_axis": guard(
+        "faults in random cycles of the Verilated axis",
+        lambda part, seed: interlock_run(1000, seed),
+    ),
+    **{
+        f"guard_{name}": guard(
+            f"faults in random cycles of the whole node of {name.upper()}, {', '.join(one.faults)}",
+            partial(faults_of_machine, name),
+        )
+        for name, one in MACHINES.items()
+    },
+    "guard_core": guard("stops of the soft core, by a jump to itself or a trap", faults_of_core),
+}

@@ -442,13 +442,13 @@ struct Campaign {
         nonsense(UNDERRUN);
     }
 
-    // More steps than the wire can carry: the generator may be 2^(AHEAD_W - 2) steps behind.
+    // More steps than the wire can carry: the generator may be most_steps behind.
     void overrun() {
         Bench& b = *bench;
         kind_of_drive(1);
         switch_on(0, 0);
         b.run_ticks(2);
-        const int64_t most_behind = 256, origin = b.steps, position = b.target;
+        const int64_t most_behind = b.pins->most_steps, origin = b.steps, position = b.target;
         const auto behind = [&](int64_t target) {
             return std::abs((((target - position) * ratio) >> 16) - (b.steps - origin));
         };

@@ -5,21 +5,22 @@ large it is.
 
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, console
+from figures.common import Figure, Quick, console, seeds
 from figures.synthesis import ECP5, ECP5_CELLS, ELABORATED, elaborated, netlist_of, placed
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 HERE = Path(__file__).resolve().parent
 CHANNEL = ROOT / "rtl" / "feedback_channel.sv"
 DRIVER = HERE / "interpolate_latency.cpp"
 BENCH = HERE / "interpolator_bench.sv"
-SEED = 1  # of the placement
+SEED = 1  # of the first placement
+PLACEMENTS = 3  # of a clock the worst is taken
 W = 8  # bits of S0's ADC
 LEADING = 2  # bits that it sends before them
 
 
 def interpolate_latency_clk() -> float:
-    """One word is sent through rtl/feedback_channel.sv, of which only the ports are looked at."""
+    """One word is sent through rtl/feedback_channel.sv, of which only the ports are read."""
     program = simulation(DRIVER, CHANNEL, W=W)
     return float(run([program, W, LEADING], "latency of the feedback channel"))
 
@@ -28,16 +29,20 @@ def interpolate_ecp5_mhz(place: bool = True, seed: int = SEED) -> float:
     """Every input of the bench is a register, and every output too: no path is left out."""
     if not place:
         return elaborated(BENCH, {"W": W})
-    netlist = netlist_of(BENCH, {"W": W}, "ecp5", seed)
+    netlist = netlist_of(BENCH, {"W": W}, "ecp5", 1)
     alone = "--lpf-allow-unconstrained", "--out-of-context"
-    fmax, used = placed(netlist, "ecp5", ECP5, 110, seed, *alone)
+    tries = [placed(netlist, "ecp5", ECP5, 110, one, *alone) for one in seeds(seed, PLACEMENTS)]
+    used = tries[0][1]
     console.print(
         "filter, correction, arctan, harmonics, tracker, position: "
         + ", ".join(
             f"{used[cell]['used']} {name.replace('_', ' ')}" for name, cell in ECP5_CELLS.items()
         )
+        + "; "
+        + ", ".join(f"{mhz:.1f}" for mhz, _ in tries)
+        + " MHz"
     )
-    return fmax
+    return min(mhz for mhz, _ in tries)
 
 
 FIGURES = {
@@ -53,7 +58,7 @@ FIGURES = {
         interpolate_ecp5_mhz,
         "MHz",
         "highest clock of the whole chain from ADC word to corrected position, one sample per "
-        "cycle, LFE5U-25F-6, placement seed 1 (one of seven others was below 100)",
+        "cycle, LFE5U-25F-6, the worst of three placements",
         ">= 100",
         ELABORATED,
         1,

@@ -5,7 +5,7 @@
 //   interpolate_latency BITS LEADING    the word has so many bits, after so many leading ones
 //
 // Prints the cycles from the word being complete in the receiver's register to its position. Only
-// ports are looked at: the last bit of the word is taken with a falling edge of adc_sclk, so the
+// ports are read: the last bit of the word is taken with a falling edge of adc_sclk, so the
 // word is complete when that edge is seen. Both data pins are at 1: sine and cosine are at their
 // upper end, which is 45 degrees.
 #include <cstdint>

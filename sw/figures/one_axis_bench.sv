@@ -38,20 +38,17 @@ module one_axis_bench (
     output logic        direction,         // pin
     output logic        drive_enable,      // pin, 1: the drive may be on
     output logic [47:0] target,            // 2^-16 period, of the engine
-    output logic [15:0] cycles             // cycles that a tick needs at most
+    output logic [15:0] cycles,            // cycles that a tick needs at most
+    output logic [15:0] most_steps         // steps still to be made that stop the step generator
 );
-    wire memory_ready, stores, hold, waits, setting_write, setting_waits, engine_ready;
+    wire memory_ready, stores, hold, waits;
     wire [13:0] stored_at;
     wire [31:0] stored_value, wdata_low, settings, live, feedback_rdata, actuator_rdata;
-    wire [2:0] setting_axis, result_axis, result_kind;
-    wire        [ 6:0] setting_word;
-    wire        [ 1:0] setting_filter;
-    wire signed [63:0] setting;
-    wire gains_changed, push, pending, moves, moved, request_waits, busy, overrun;
+    wire [2:0] result_axis, result_kind;
+    wire pending, moves, moved, request_waits, overrun;
     wire step_made, step_down, block_up, block_down, closed_loop, play, arm, controlled_stop;
     wire hold_target, result_valid, result_flag;
     wire [47:0] position, moved_by, result;
-    wire signed [47:0] shift_by;
     wire line_start, line_idle, rate_valid, rate_restart, rate_steep, line_stopped;
     wire signed [36:0] rate;
     wire        [ 7:0] chain_setting_written;
@@ -68,6 +65,7 @@ module one_axis_bench (
 
     assign ready  = memory_ready && !waits;
     assign target = u_axis.target;
+    assign most_steps = 16'(1 << (u_axis.g_drive.u_actuator.g_stepper.u_steps.AHEAD_W - 2));
     assign rdata = live | feedback_rdata | actuator_rdata;
 
     register_memory u_memory (
@@ -85,86 +83,49 @@ module one_axis_bench (
         .stored_at,
         .stored_value
     );
-    engine_bus #(
+    motion #(
         .FILTERS(2)
-    ) u_bus (
-        .clk,
-        .rst,
-        .stores,
-        .address  (stored_at),
-        .value    (stored_value),
-        .value_low(wdata_low),
-        .hold,
-        .waits,
-        .ready    (engine_ready),
-        .setting_waits,
-        .setting_write,
-        .setting_axis,
-        .setting_word,
-        .setting_filter,
-        .setting,
-        .gains_changed,
-        .push,
-        .pending,
-        .moves,
-        .moved,
-        .moved_by,
-        .shift_by
-    );
-    motion_engine #(
-        .FILTERS(2)
-    ) u_engine (
+    ) u_motion (
         .clk,
         .rst,
         .tick,
+        .tick_period  (tick_period[17:0]),
         .now,
-        .setting_write,
-        .setting_axis,
-        .setting_word,
-        .setting_filter,
-        .setting,
-        .setting_waits,
+        .stores,
+        .stored_at,
+        .stored_value,
+        .wdata_low,
+        .hold,
+        .waits,
         .position,
-        .stepped               (step_made),
-        .downward              (step_down),
+        .step_made,
+        .step_down,
+        .moves,
+        .moved,
+        .moved_by,
         .block_up,
         .block_down,
         .closed_loop,
-        .start                 (play),
+        .play,
         .arm,
         .controlled_stop,
-        .set_target_to_position(hold_target),
-        .push,
-        .gains_changed,
-        .shift                 (moved),
-        .shift_by,
-        .waits                 (request_waits),
+        .hold_target,
+        .request_waits,
+        .pending,
         .result_valid,
         .result_axis,
         .result_kind,
         .result,
         .result_flag,
-        .ready                 (engine_ready),
-        .busy,
-        .overrun,
-        .cycles
-    );
-    step_lines u_lines (
-        .clk,
-        .rst,
-        .period    (tick_period[17:0]),
-        .tick,
-        .valid     (result_valid && result_kind == 3'd6),
-        .axis      (result_axis),
-        .target    (result),
-        .restart_in(result_flag),
-        .stopped   (line_stopped),
+        .servo_overrun(overrun),
+        .cycles,
         .line_start,
         .line_idle,
         .rate_valid,
         .rate,
         .rate_restart,
-        .rate_steep
+        .rate_steep,
+        .line_stopped
     );
     interpolation_chain #(
         .AXES(2)
@@ -291,8 +252,8 @@ module one_axis_bench (
         chain_overspeed[0], chain_disagreement[0], chain_lost[0]
     };
     wire unused = &{
-        1'b0, chain, address[1:0], tick_period[23:18], settings, busy, compare_pulse, adc_cs_n,
-        adc_sclk, dac_cs_n, dac_sclk, dac_sdi
+        1'b0, chain, address[1:0], tick_period[23:18], settings, result_axis, compare_pulse,
+        adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi
     };
 endmodule
 

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import ruckig  # type: ignore[import-not-found]
 
-from figures.common import ROOT, Figure, Quick, bar, console, shares
+from figures.common import Figure, Quick, bar, console, shares
 from tables.engine_microcode import ADDRESS, OPERANDS
 from twin.build import (
+    ROOT,
     VERILATED,
     compile_flags,
     compiler,

@@ -9,8 +9,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, bar, console
+from figures.common import Figure, Quick, bar, console
 from tools import check_imports, check_latency, check_ports, check_types, docs_commands
+from twin.build import ROOT
 
 
 def listed(problems: list[str]) -> int:

@@ -11,9 +11,10 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
+from campaigns.campaign import Campaign
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from twin import BuildError
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 PASS = ROOT / "rtl" / "peripheral" / "ps2_pass.sv"
 DRIVER = Path(__file__).with_name("ps2_run.cpp")
@@ -30,6 +31,12 @@ def program() -> Path:
     return simulation(DRIVER, PASS, CLK_HZ=CLK_HZ)
 
 
+def sequences_run(count: int, seed: int) -> dict[str, float]:
+    """What the program counts over so many random sequences, {name: number}."""
+    words = run([program(), "sequences", count, seed], "ps2_run").split()
+    return dict(zip(words[1::2], map(float, words[::2])))
+
+
 def sequences(count: int = SEQUENCES, seed: int = 1) -> dict[str, float]:
     """Totals of random sequences: a person's keys, the host's commands, injections, and frames that
     the host cuts short.
@@ -38,8 +45,7 @@ def sequences(count: int = SEQUENCES, seed: int = 1) -> dict[str, float]:
     with bar(f"{count:.0e} sequences") as progress:
         task = progress.add_task("", total=count)
         for size, number in shares(count, SHARE, seed):
-            words = run([program(), "sequences", size, number], "ps2_run").split()
-            for name, value in zip(words[1::2], map(float, words[::2])):
+            for name, value in sequences_run(size, number).items():
                 totals[name] = totals.get(name, 0) + value
             progress.advance(task, size)
     console.print(", ".join(f"{value:.0f} {name}" for name, value in totals.items()))
@@ -122,4 +128,13 @@ FIGURES = {
     ),
 }
 
-SOAK = {"ps2": lambda: (totals := sequences(10**6), totals["wrong"] == 0)}
+CAMPAIGNS = {
+    "ps2": Campaign(
+        "sequences through the PS/2 pass-through: keys, commands of the host, injections, frames "
+        "cut short; failed: bytes wrong",
+        lambda part, seed: {"sequences": SHARE, **sequences_run(SHARE, seed)},
+        parts=1000,
+        tried="sequences",
+        failed="wrong",
+    )
+}

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
-from figures.common import ROOT, Figure
+from figures.common import Figure
+from twin.build import ROOT
 
 RECORD = ROOT / "docs" / "figures.toml"
 HEAD = """\

@@ -10,9 +10,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
+from campaigns.campaign import Campaign
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, UP5K, elaborated, netlist_of, placed, source_of
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 RELAY = ROOT / "rtl" / "relay.sv"
 DRIVER = Path(__file__).with_name("relay_run.cpp")
@@ -31,8 +32,8 @@ RATES_MHZ = (24, 30, 36, 40, 44, 46, 47, 47.5)
 
 def relay_run(*words: object) -> dict[str, float]:
     """What the program prints, {name: number}."""
-    told = run([simulation(DRIVER, RELAY, **AS_MEASURED), *words], "relay_run").split()
-    return dict(zip(told[1::2], map(float, told[::2])))
+    printed = run([simulation(DRIVER, RELAY, **AS_MEASURED), *words], "relay_run").split()
+    return dict(zip(printed[1::2], map(float, printed[::2])))
 
 
 def harmonic_arith_arcsec(points: int = POINTS, rings: int = RINGS, seed: int = 1) -> float:
@@ -49,6 +50,11 @@ def relay_latency_us(rings: int = RINGS, seed: int = 1) -> float:
     return max(relay_run("latency", one)["clk"] for one in seeds(seed, rings)) / CLK_MHZ
 
 
+def edges_run(mhz: float, edges: int, seed: int) -> dict[str, float]:
+    """What the program counts over so many edges, {name: number}."""
+    return relay_run("edges", mhz * 1e6, edges, seed)
+
+
 def count_errors(edges: int = EDGES, mhz: float = 24, seed: int = 1) -> float:
     """Cycles in which the output is not the corrected input, over so many edges whose rate is
     independent of the clock.
@@ -57,7 +63,7 @@ def count_errors(edges: int = EDGES, mhz: float = 24, seed: int = 1) -> float:
     with bar(f"{edges:.0e} edges") as progress:
         task = progress.add_task("", total=edges)
         for size, number in shares(edges, SHARE, seed):
-            for name, value in relay_run("edges", mhz * 1e6, size, number).items():
+            for name, value in edges_run(mhz, size, number).items():
                 totals[name] = totals.get(name, 0) + value
             progress.update(task, completed=totals["edges"])
     console.print(
@@ -170,4 +176,13 @@ FIGURES = {
     ),
 }
 
-SOAK = {"relay": lambda: (wrong := count_errors(10**9), wrong == 0)}
+CAMPAIGNS = {
+    "relay": Campaign(
+        "edges into the relay at 24 MHz with reversals, a ring for each million; failed: cycles in "
+        "which the output is not the corrected input",
+        lambda part, seed: edges_run(24, SHARE, seed),
+        parts=1000,
+        tried="edges",
+        failed="wrong",
+    )
+}

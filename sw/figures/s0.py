@@ -4,12 +4,14 @@
 import itertools
 import random
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from rich.progress import Progress
 
+from campaigns.campaign import Campaign, Counts
 from experiments import s0_stage
-from figures.common import Figure, Quick, bar, console, soaked
+from figures.common import Figure, Quick, bar, console
 from moire.bus.protocol import (
     TO_NODE,
     Exchange,
@@ -37,19 +39,17 @@ READINGS = 8  # of a zero
 WORK_CELLS = 400  # that a request may take, at the low clock of the bench
 
 
-def homed_stage(progress: Progress, seed: int) -> s0_stage.Stage:
+def homed_stage(seed: int, progress: Progress | None = None) -> s0_stage.Stage:
     stage = s0_stage.Stage.power_up(seed)
     stage.find()
-    task = progress.add_task("", total=len(stage.axes))
-    for name in stage.axes:
+    for name in progress.track(stage.axes) if progress else stage.axes:
         stage.home(name)
-        progress.advance(task)
     return stage
 
 
 def s0_coarse_um_max(count: int = 100, seed: int = SEED) -> float:
     with bar("homing") as progress:
-        stage = homed_stage(progress, seed)
+        stage = homed_stage(seed, progress)
     with bar("moves") as progress:
         task = progress.add_task("", total=count)
         moves = s0_stage.random_moves(stage, count, seed, done=lambda move: progress.advance(task))
@@ -71,18 +71,20 @@ def apart_nm(stage: s0_stage.Stage) -> float:
     return (before + stage.true_nm("X", from_zero=False)) / 2 - float(position)
 
 
-def s0_home_spread_nm(count: int = 20, seed: int = SEED) -> float:
-    source, readings = random.Random(seed), []
-    stage = s0_stage.Stage.power_up(seed)
+def homings(count: int, seed: int) -> Iterator[list[float]]:
+    """Readings of the zero after each of so many homings from random positions."""
+    source, stage = random.Random(seed), s0_stage.Stage.power_up(seed)
     stage.find()
+    for _ in range(count):
+        stage.home("X")
+        stage.dwell(0.05)
+        yield [apart_nm(stage) for _ in range(READINGS)]
+        stage.move("X", source.uniform(-0.5e6, 1.5e6))
+
+
+def s0_home_spread_nm(count: int = 20, seed: int = SEED) -> float:
     with bar("homings from random positions") as progress:
-        task = progress.add_task("", total=count)
-        for _ in range(count):
-            stage.home("X")
-            stage.dwell(0.05)
-            readings.append([apart_nm(stage) for _ in range(READINGS)])
-            progress.advance(task)
-            stage.move("X", source.uniform(-0.5e6, 1.5e6))
+        readings = list(progress.track(homings(count, seed), total=count))
     zeros, single = np.mean(readings, axis=1), np.ptp(readings)
     console.print(
         f"zero at {zeros.mean():.2f} nm, rms {zeros.std():.2f} nm; the switch scatters by "
@@ -166,60 +168,82 @@ class Judge:
         return changed
 
 
-def s0_bus_wrong(
-    frames: int = 100_000, make_bench: Callable[[int], FrameBench] = FrameBench, seed: int = SEED
-) -> int:
+@dataclass
+class Frames:
+    """What became of damaged frames, and of the undamaged ones between them."""
+
+    wrong: int = 0  # accepted by the node
+    wrong_host: int = 0  # accepted by the host
+    refused: int = 0  # undamaged ones
+    lost: int = 0  # answers
+
+    @property
+    def failures(self) -> int:
+        return self.wrong + self.wrong_host + self.refused + self.lost
+
+
+def damaged_frames(
+    frames: int, bench: FrameBench, seed: int, done: Callable[[], None] = lambda: None
+) -> Frames:
     """Each frame is damaged on its way to the node, and the reply on its way to the host. After
     every hundredth an undamaged frame must be accepted, so that a count of zero means something.
     """
-    source, bench = random.Random(seed), make_bench(ADDRESS)
-    wrong = wrong_host = lost = good = 0
+    source, total = random.Random(seed), Frames()
     judge, bodies = Judge(node_answer(bench)[0]), requests(source)
+    for number in range(frames + frames // 100):
+        body, whole = next(bodies), number % 101 == 100
+        command, payload = (
+            cells_of(write_words(ADDRESS)),
+            cells_of(list(frame(write_words(ADDRESS)[0] & 0xFF, body))),
+        )
+        cells = command + payload
+        sent = cells if whole else damaged(cells, source)
+        ready = bench.exchange(
+            TURNAROUND + sent[: len(command)], enough=1, quiet_cells=ANSWER_CELLS
+        )
+        if ready and ready != [READY]:  # the damage made it a command to reply
+            bench.exchange(TURNAROUND, quiet_cells=ANSWER_CELLS)
+        if bench.exchange(
+            TURNAROUND + sent[len(command) :], enough=1, quiet_cells=ANSWER_CELLS // 2
+        ):
+            bench.exchange(TURNAROUND, quiet_cells=ANSWER_CELLS)
+        if whole:
+            bench.idle(WORK_CELLS)
+        reply, words = node_answer(bench)
+        if reply is None:
+            total.lost += 1
+            total.refused += whole
+            continue
+        accepted = judge.accepted(reply)
+        if whole:
+            total.refused += not (accepted and reply.sequence == body[0])
+            continue
+        total.wrong += accepted
+        done()
+        exchange = Exchange(ADDRESS, bytes([reply.sequence, reply.operation]), tries=1)
+        exchange.feed([READY])
+        exchange.feed(heard(damaged(cells_of(words), source) + [1] * CELLS))
+        # with the last stop bit alone damaged the reply is whole, and right
+        total.wrong_host += exchange.state == State.DONE and exchange.reply != reply
+    return total
+
+
+def s0_bus_wrong(
+    frames: int = 100_000, make_bench: Callable[[int], FrameBench] = FrameBench, seed: int = SEED
+) -> int:
     with bar("damaged frames") as progress:
         task = progress.add_task("", total=frames)
-        for number in range(frames + frames // 100):
-            body, whole = next(bodies), number % 101 == 100
-            command, payload = (
-                cells_of(write_words(ADDRESS)),
-                cells_of(list(frame(write_words(ADDRESS)[0] & 0xFF, body))),
-            )
-            cells = command + payload
-            sent = cells if whole else damaged(cells, source)
-            ready = bench.exchange(
-                TURNAROUND + sent[: len(command)], enough=1, quiet_cells=ANSWER_CELLS
-            )
-            if ready and ready != [READY]:  # the damage made it a command to reply
-                bench.exchange(TURNAROUND, quiet_cells=ANSWER_CELLS)
-            if bench.exchange(
-                TURNAROUND + sent[len(command) :], enough=1, quiet_cells=ANSWER_CELLS // 2
-            ):
-                bench.exchange(TURNAROUND, quiet_cells=ANSWER_CELLS)
-            if whole:
-                bench.idle(WORK_CELLS)
-            reply, words = node_answer(bench)
-            if reply is None:
-                lost += 1
-                continue
-            accepted = judge.accepted(reply)
-            good += whole and accepted and reply.sequence == body[0]
-            wrong += not whole and accepted
-            if not whole:
-                progress.advance(task)
-                exchange = Exchange(ADDRESS, bytes([reply.sequence, reply.operation]), tries=1)
-                exchange.feed([READY])
-                exchange.feed(heard(damaged(cells_of(words), source) + [1] * CELLS))
-                # with the last stop bit alone damaged the reply is whole, and right
-                wrong_host += exchange.state == State.DONE and exchange.reply != reply
+        total = damaged_frames(frames, make_bench(ADDRESS), seed, lambda: progress.advance(task))
     console.print(
-        f"{frames} damaged requests: {wrong} accepted by the node; their damaged replies: "
-        f"{wrong_host} accepted by the host; {good} of {frames // 100} undamaged requests between "
-        f"them accepted; answers missing afterwards: {lost}"
+        f"{frames} damaged requests: {total.wrong} accepted by the node; their damaged replies: "
+        f"{total.wrong_host} accepted by the host; {total.refused} of {frames // 100} undamaged "
+        f"requests between them refused; answers missing afterwards: {total.lost}"
     )
-    if good != frames // 100 or lost:
+    if total.refused or total.lost:
         raise BusError(
-            ADDRESS, f"the node missed {frames // 100 - good} undamaged frames and {lost} answers"
+            ADDRESS, f"the node missed {total.refused} undamaged frames and {total.lost} answers"
         )
-    return wrong + wrong_host
+    return total.wrong + total.wrong_host
 
 
 FIGURES = {
@@ -253,7 +277,55 @@ FIGURES = {
 }
 
 
-SOAK = {
-    "s0_moves": lambda: soaked(FIGURES["s0_coarse_um_max"], 5000),
-    "s0_bus": lambda: soaked(FIGURES["s0_bus_wrong"], 2_000_000),
+MOVES_A_PART = 50
+FRAMES_A_PART = 2000
+HOMINGS_A_PART = 5
+COARSE_NM, HOME_NM = 50, 5  # bounds of s0_coarse_um_max and s0_home_spread_nm
+
+
+def moves_of_part(part: int, seed: int) -> Counts:
+    errors = [
+        abs(move.error_nm) for move in s0_stage.random_moves(homed_stage(seed), MOVES_A_PART, seed)
+    ]
+    failed = sum(error > COARSE_NM for error in errors)
+    return {"moves": len(errors), "failed": failed, "nm": max(errors)}
+
+
+def frames_of_part(part: int, seed: int) -> Counts:
+    totals = damaged_frames(FRAMES_A_PART, FrameBench(ADDRESS), seed)
+    return {"frames": 2 * FRAMES_A_PART, **totals.__dict__, "failures": totals.failures}
+
+
+def homings_of_part(part: int, seed: int) -> Counts:
+    zeros = np.array([np.mean(readings) for readings in homings(HOMINGS_A_PART, seed)])
+    off = np.abs(zeros - np.median(zeros))
+    return {"homings": len(zeros), "failed": int((off > HOME_NM).sum()), "nm": float(off.max())}
+
+
+CAMPAIGNS = {
+    "s0_moves": Campaign(
+        "random moves of S0, motor only; failed: true position more than 50 nm off the target",
+        moves_of_part,
+        parts=100,
+        tried="moves",
+        failed="failed",
+        largest=("nm",),
+    ),
+    "s0_bus": Campaign(
+        "frames of S0 with one to three flipped bits, half of them each way; failed: accepted "
+        "ones, and good ones refused",
+        frames_of_part,
+        parts=1000,
+        tried="frames",
+        failed="failures",
+    ),
+    "homing_s0": Campaign(
+        "homings of S0 from random positions to a switch that scatters by +-200 nm; failed: zero "
+        "more than 5 nm off the others of its power-up",
+        homings_of_part,
+        parts=2000,
+        tried="homings",
+        failed="failed",
+        largest=("nm",),
+    ),
 }

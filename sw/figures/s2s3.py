@@ -6,8 +6,9 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
+from campaigns.campaign import Campaign, Counts
 from experiments import s3_zero
-from figures.common import Figure, Quick, bar, console, seeds, shares, soaked
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from twin import build
 
 SEARCHES_A_POWER_UP = 10
@@ -108,7 +109,37 @@ FIGURES = {
 }
 
 
-SOAK = {
-    "s2_counts": lambda: soaked(FIGURES["s2_count_errors"], 10**9),
-    "s3_zero": lambda: soaked(FIGURES["s3_zero_um_max"], 10_000),
+def pulses_of_part(part: int, seed: int) -> Counts:
+    total = Counter[str]()
+    for axis in counted(seed):
+        total.update(axis)
+    return dict(total)
+
+
+ZERO_S3 = 0  # count of the scale at the mark
+
+
+def searches_of_part(part: int, seed: int) -> Counts:
+    made = s3_zero.searches(SEARCHES_A_POWER_UP, seed)
+    failed = sum(search.zero_counts != ZERO_S3 for search in made)
+    slowest = max(search.time_s for search in made)
+    return {"homings": len(made), "failed": failed, "slowest search in s": slowest}
+
+
+CAMPAIGNS = {
+    "homing_s3": Campaign(
+        "zero searches of the linear motor of S3 from anywhere within 1 mm; failed: another count",
+        searches_of_part,
+        parts=10**5 // SEARCHES_A_POWER_UP,
+        tried="homings",
+        failed="failed",
+        largest=("slowest search in s",),
+    ),
+    "s2_counts": Campaign(
+        "pulses of three scales at random speeds, through every overflow; failed: wrong counts",
+        pulses_of_part,
+        parts=1000,
+        tried="pulses",
+        failed="wrong",
+    ),
 }

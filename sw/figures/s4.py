@@ -11,6 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+from campaigns.campaign import Campaign, Counts
 from experiments import s4_job
 from figures.common import Figure, Quick, bar, console, seeds
 from moire.client.bus import Bus
@@ -144,11 +145,20 @@ FIGURES = {
 }
 
 
-def whole_jobs() -> tuple[float, bool]:
-    outcomes = jobs(calm_job, JOBS)
-    return max(outcome.worst for outcome in outcomes), not any(
-        outcome.failed for outcome in outcomes
+def whole_job(part: int, seed: int) -> Counts:
+    outcome = calm_job(seed)
+    counts = {"jobs": 1, "failed": bool(outcome.failed), "cuts": len(outcome.cuts)}
+    return {**counts, "arcsec": outcome.worst, "outcome": outcome.words}
+
+
+CAMPAIGNS = {
+    "s4_jobs": Campaign(
+        "whole jobs of 36 stations on a random worm; failed: jobs with a station not cut, cut "
+        "twice or beyond the tolerance",
+        whole_job,
+        parts=JOBS,
+        tried="jobs",
+        failed="failed",
+        largest=("arcsec",),
     )
-
-
-SOAK = {"s4_jobs": whole_jobs}
+}

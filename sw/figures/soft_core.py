@@ -22,11 +22,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from figures.common import ROOT, Figure, Quick, console
+from figures.common import Figure, Quick, console
 from figures.synthesis import BUILD, ECP5, netlist_of, placed, source_of
 from firmware import build as tools
 from moire.made.registers import MAP_CRC
 from twin import build
+from twin.build import ROOT
 
 HERE = Path(__file__).resolve().parent
 MEMORY_BYTES = 98304

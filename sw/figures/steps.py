@@ -8,9 +8,10 @@ The campaign of 10^8 reversals is `make soak K=steps`.
 from functools import cache
 from pathlib import Path
 
-from figures.common import ROOT, Figure, Quick, bar, console, seeds, shares
+from campaigns.campaign import Campaign, Counts
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, elaborated, synthesise_ice40
-from twin.build import run, simulation
+from twin.build import ROOT, run, simulation
 
 DRIVER = Path(__file__).with_name("steps_run.cpp")
 BENCH = Path(__file__).with_name("steps_bench.sv")
@@ -146,9 +147,20 @@ FIGURES = {
     ),
 }
 
-SOAK = {
-    "steps": lambda: (
-        totals := reversals(10**8),
-        not (totals["lost"] or totals["violations"] or totals["overruns"]),
+
+def reversals_of_part(part: int, seed: int) -> Counts:
+    counts = steps_run("reversals", SHARE, seed)
+    failures = counts["lost"] + counts["violations"] + counts["overruns"]
+    return {**counts, "failures": failures}
+
+
+CAMPAIGNS = {
+    "steps": Campaign(
+        "reversals of the step generator at random rates, timings and polarities; failed: steps "
+        "lost, timings violated, overruns",
+        reversals_of_part,
+        parts=1000,
+        tried="reversals",
+        failed="failures",
     )
 }

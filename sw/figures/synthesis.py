@@ -15,14 +15,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from figures.common import ROOT, Quick
+from figures.common import Quick
+from twin.build import CORES, ROOT
 
 BUILD = ROOT / "build" / "synthesis"
 PADS = 150  # an inner block has more ports than the ECP5 has pads: it is placed without any
 ECP5 = ["--25k", "--package", "CABGA256", "--speed", "6"]  # LFE5U-25F-6
 ECP5_CELLS = {"lut": "TRELLIS_COMB", "ff": "TRELLIS_FF", "block_ram": "DP16KD", "dsp": "MULT18X18D"}
 LUT4S = {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}  # that a cell of a netlist takes
-CORES = {"pythondata_cpu_picorv32": "verilog", "pythondata_cpu_serv": "verilog/rtl"}
 ICE40 = ["--hx8k", "--package", "ct256"]
 UP5K = ["--up5k", "--package", "sg48"]
 ELABORATED = Quick(

@@ -2,14 +2,16 @@
 """Coverage-guided fuzzing of everything that the host package reads: bytes of the bus and of
 clients, files, words on the command line.
 
-    python -m fuzz.parser_fuzz SECONDS [SEED]
+    python -m fuzz.parser_fuzz SECONDS [SEED] [--parser NAME] [--json]
 
 A parser must answer any input, or refuse it with a MoireError; any other exception, and an input
 that takes long, is a crash. An input that reaches a pair of lines that was not reached before joins
 the corpus that the next inputs are made of.
 """
 
+import argparse
 import io
+import json
 import os
 import random
 import signal
@@ -39,7 +41,9 @@ from moire.made.bus_tables import OPERATIONS, PARAMETERS, PROTOCOL_CRC
 
 PACKAGE = str(Path(moire.__file__).parent)
 LONGEST = 600
-HANG_S = 10
+HANG_S = 10  # of processor time: other programs may keep this one from running
+BLOCKED_S = 600  # of any time
+TIMERS = {signal.SIGPROF: signal.ITIMER_PROF, signal.SIGALRM: signal.ITIMER_REAL}
 
 Parser = Callable[[bytes], object]
 Line = tuple[CodeType, int]
@@ -276,6 +280,18 @@ def mutated(draw: random.Random, target: Target) -> bytes:
     return bytes(data[:LONGEST])
 
 
+def counted(target: Target) -> dict[str, Any]:
+    """What became of a target, for other programs."""
+    return {
+        "parser": target.parse.__name__,
+        "runs": target.runs,
+        "seconds": target.seconds,
+        "corpus": len(target.corpus),
+        "pairs": len(target.seen),
+        "crashes": {where: repr(data) for where, data in target.crashes.items()},
+    }
+
+
 class Hang(Exception):
     pass
 
@@ -287,8 +303,9 @@ def hang(*_: object) -> NoReturn:
 def attempt(target: Target, data: bytes) -> bool:
     """Runs one input; returns whether it reached anything new."""
     where: str | None = None
-    pairs, began = Pairs(), time.perf_counter()
-    signal.setitimer(signal.ITIMER_REAL, HANG_S)
+    pairs, began = Pairs(), time.process_time()
+    for timer, seconds in zip(TIMERS.values(), (HANG_S, BLOCKED_S)):
+        signal.setitimer(timer, seconds)
     sys.settrace(pairs.call)
     try:
         target.parse(data)
@@ -304,8 +321,9 @@ def attempt(target: Target, data: bytes) -> bool:
         where = f"{type(error).__name__} at {file}:{at.tb_lineno}: {error}"
     finally:
         sys.settrace(None)
-        signal.setitimer(signal.ITIMER_REAL, 0)
-    target.runs, target.seconds = target.runs + 1, target.seconds + time.perf_counter() - began
+        for timer in TIMERS.values():
+            signal.setitimer(timer, 0)
+    target.runs, target.seconds = target.runs + 1, target.seconds + time.process_time() - began
     if where:
         target.crashes.setdefault(where, data)
     new = pairs.found - target.seen
@@ -316,17 +334,19 @@ def attempt(target: Target, data: bytes) -> bool:
 def fuzz(
     seconds: float, seed: int = 1, parsers: Sequence[Parser] = tuple(SEEDS), first: bool = False
 ) -> list[Target]:
-    """The targets after so many seconds for all of them; with `first` the first crash ends it."""
+    """The targets after so many seconds of processor time for all of them; with `first` the first
+    crash ends it.
+    """
     draw = random.Random(seed)
     targets = [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers]
-    before = signal.signal(signal.SIGALRM, hang)
-    end, nowhere = time.monotonic() + seconds, io.StringIO()
+    before = {number: signal.signal(number, hang) for number in TIMERS}
+    end, nowhere = time.process_time() + seconds, io.StringIO()
     try:
         with redirect_stdout(nowhere), redirect_stderr(nowhere):
             for target in targets:
                 for data in target.corpus:
                     attempt(target, data)
-            while time.monotonic() < end and not (
+            while time.process_time() < end and not (
                 first and any(target.crashes for target in targets)
             ):
                 target = min(targets, key=lambda target: target.seconds)  # each has the same time
@@ -337,12 +357,24 @@ def fuzz(
                     nowhere.seek(0)
                     nowhere.truncate()
     finally:
-        signal.signal(signal.SIGALRM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return targets
 
 
 def main() -> int:
-    targets = fuzz(float(sys.argv[1]), int((sys.argv[2:] or ["1"])[0]))
+    known = {parse.__name__: parse for parse in SEEDS}
+    parser = argparse.ArgumentParser(description="Fuzz the parsers of the host package.")
+    parser.add_argument("seconds", type=float, help="for all parsers together")
+    parser.add_argument("seed", type=int, nargs="?", default=1)
+    parser.add_argument("--parser", choices=known, help="this parser alone")
+    parser.add_argument("--json", action="store_true", help="print the counts as JSON")
+    options = parser.parse_args()
+    chosen = [known[options.parser]] if options.parser else list(SEEDS)
+    targets = fuzz(options.seconds, options.seed, chosen)
+    if options.json:
+        print(json.dumps([counted(target) for target in targets]))
+        return 0
     for target in targets:
         print(
             f"{target.parse.__name__:16} {target.runs:8} runs, a corpus of "

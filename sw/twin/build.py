@@ -24,7 +24,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from firmware import build as firmware_build
-from twin import rising_edge
+from twin import netlist, rising_edge
 from twin.parameters import tables as parameters
 
 HERE = Path(__file__).resolve().parent
@@ -412,6 +412,7 @@ def verilate_node(
     includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
     (folder / "verilated_node.h").write_text(
         "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
+        "#include <cstring>\n"
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
         f"constexpr bool SERIAL_CORE = {'true' if values.get('HAS_SERIAL_CORE') else 'false'};\n"
@@ -419,18 +420,72 @@ def verilate_node(
     )
 
 
+def netlist_of_node(
+    family: str, clk_hz: int, axes: int, node: Mapping[str, int], words: Sequence[int]
+) -> list[Path]:
+    """Sources of the netlist of a node, whose memory has these words since synthesis."""
+    image = BUILD / f"{digest([], list(words))}.hex"
+    BUILD.mkdir(parents=True, exist_ok=True)
+    image.write_text("".join(f"{word:08x}\n" for word in words))
+    values: dict[str, int | str] = {
+        "CLK_HZ": clk_hz,
+        "AXES": axes,
+        "MEMORY_BYTES": MEMORY_BYTES,
+        "FIRMWARE": str(image.relative_to(ROOT)),
+        **node,
+    }
+    return netlist.sources(family, ROOT / "rtl" / "node.sv", values, rtl_path())
+
+
+def verilate_netlist(
+    folder: Path, verilator: Path, sources: Sequence[Path], clk_hz: int, axes: int
+) -> None:
+    """C++ of the netlist of a node. Verilator evaluates it twice a cycle: with the inputs, and at
+    the rising edge.
+    """
+    run(
+        [
+            *[verilator / "bin" / "verilator_bin", *VERILATE, "-Wno-lint", "-Wno-style"],
+            *["-Wno-fatal", "--prefix", "Vnode", "--top-module", "node", *sources],
+            *["--Mdir", folder],
+        ],
+        "verilator of the netlist of the node",
+        environment={**os.environ, "VERILATOR_ROOT": str(verilator)},
+    )
+    includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
+    (folder / "verilated_node.h").write_text(
+        "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
+        f"{includes}"
+        f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
+        "constexpr bool SERIAL_CORE = false;\n"
+        "struct Rest {};  // nothing of a netlist rests\n"
+        "inline void rising_edge(Vnode___024root& pins, Rest&) {\n"
+        "    for (int level = 0; level < 2; level++) {\n"
+        "        pins.clk = level;\n"
+        "        pins.vlSymsp->__Vm_modelp->eval();\n"
+        "    }\n}\n"
+    )
+
+
 def twin_library(
-    clk_hz: int = 2_400_000, axes: int = 1, node: Mapping[str, int] | None = None
+    clk_hz: int = 2_400_000,
+    axes: int = 1,
+    node: Mapping[str, int] | None = None,
+    words: Sequence[int] = (),
 ) -> Path:
     """libtwin.so: Verilated nodes, machines and line. node: more parameters of rtl/node.sv, {name:
-    value}.
+    value}. With NETLIST=ecp5|ice40 in the environment, the nodes are netlists with the firmware
+    `words` in their memory.
     """
     tool = compiler()
+    family = os.environ.get("NETLIST")
+    cells = netlist_of_node(family, clk_hz, axes, node or {}, words) if family else []
     verilator = package("verilator", "it makes C++ of the RTL")
     sources = [
         *own_sources(),
         *sorted((ROOT / "rtl").rglob("*.sv")),
         *sorted((ROOT / "rtl").rglob("*.vlt")),
+        *cells,
         package("pythondata_cpu_picorv32", "the soft core") / "verilog" / "picorv32.v",
     ]
     verilator_bytes = (verilator / "bin" / "verilator_bin").stat().st_size
@@ -439,7 +494,7 @@ def twin_library(
         design = (clk_hz, axes, sorted((node or {}).items()), tool, verilator_bytes)
         return BUILD / f"twin-{digest(sources, *design, *flags)}"
 
-    folder, soon = folder_of(COMPILE, COUNT_BRANCHES, USE_COUNTS), for_short_runs()
+    folder, soon = folder_of(COMPILE, COUNT_BRANCHES, USE_COUNTS), bool(cells) or for_short_runs()
     if (folder / "libtwin.so").exists():
         return folder / "libtwin.so"
     if soon:
@@ -454,7 +509,10 @@ def twin_library(
 
     def make(folder: Path) -> None:
         (folder / "parameters.h").write_text(parameters.header())
-        verilate_node(folder, verilator, clk_hz, axes, node or {})
+        if cells:
+            verilate_netlist(folder, verilator, cells, clk_hz, axes)
+        else:
+            verilate_node(folder, verilator, clk_hz, axes, node or {})
         report(f"verilated after {time.monotonic() - start:.0f} s")
         include = [f"-I{folder}", f"-I{HERE}", f"-I{verilator / 'include'}"]
         verilated = folder / f"{TWIN.stem}.o"

@@ -5,7 +5,12 @@ Verilator evaluates first the flip-flops, then all logic between them, and keeps
 memory until the next edge. Here the logic comes first, with the inputs of this cycle, and then the
 flip-flops. Most signals are then needed within one call only: they become local variables, and what
 only one branch of a condition needs is computed in this branch. The registers, memories and outputs
-after each edge are the same, bit for bit; tb/twin/test_rising_edge.py compares them.
+after each edge are the same, bit for bit; tb/twin/test_rising_edge.py compares them. Reset is left
+to Verilator's evaluation: in the function it is low.
+
+While the soft core waits, most of the node rests: its registers stay as they are until one of its
+inputs changes. Such an edge evaluates only the other part. Which part works is a list of names; a
+wrong list costs time, but the result is the same.
 
 Everything here works on the text that `verilator --no-decoration` makes: one statement a line,
 braces at the ends of lines.
@@ -27,6 +32,18 @@ NAME = re.compile(
     r"\b(?!(?:vlSelfRef|[CSIQ]Data|if|else|for|while|do)\b|VL_)([A-Za-z_]\w*)",
 )
 CALL = re.compile(rf"{ROOT}___(\w+)\(vlSelf\);")
+RESET = re.compile(r"\(IData\)\(vlSelfRef\.rst\)|vlSelfRef\.rst\b")
+NEVER = "0U"  # its level
+# Whether the soft core waits; then most of the design does nothing, but for these blocks.
+CORE = "vlSelfRef.node__DOT__g_core__DOT__u_core__DOT__"
+WAITS = f"vlSelfRef.node__DOT__core_waits & {CORE}mem_valid & {CORE}mem_addr >> 31"
+SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
+WORKS = re.compile(
+    r"(?:^|__DOT__)(?:now|u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|u_core_wait__\w+|"
+    r"u_engine__DOT__(?!u_settings)\w+|u_lines__\w+|u_chain__\w+|u_monitor__\w+|"
+    r"u_adc__\w+|age|since|timer|limit_tick|sample_tick|due|scale_valid|stepped|counted|strobe|"
+    r"arrived|result_\w+)$"
+)
 PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
 
 Names = frozenset[str]
@@ -180,14 +197,15 @@ class Parser:
         target = self.names(name)
         return Plain((line,), Effect(needs | self.names(index) | target, NONE, target))
 
-    def choice(self, condition: str) -> Choice:
+    def choice(self, condition: str) -> Statement:
         """An if, whose line is the next."""
         self.at += 1
         yes = self.block()
         no: tuple[Statement, ...] = ()
         line = self.end()
         if line.startswith("} else if (") and line.endswith(") {"):
-            return Choice(condition, self.names(condition), yes, (self.choice(line[11:-3]),))
+            no = (self.choice(line[11:-3]),)
+            return self.chosen(condition, yes, no)
         self.at += 1
         if line == "} else {":
             no = self.block()
@@ -195,6 +213,14 @@ class Parser:
             self.at += 1
         if line != "}":
             raise FormError(f"a block ends with {line!r}")
+        return self.chosen(condition, yes, no)
+
+    def chosen(
+        self, condition: str, yes: tuple[Statement, ...], no: tuple[Statement, ...]
+    ) -> Statement:
+        """A choice, without what is only for reset."""
+        if condition == NEVER:
+            return Group(no)
         return Choice(condition, self.names(condition), yes, no)
 
     def end(self) -> str:
@@ -220,6 +246,7 @@ class Design:
 
     types: dict[str, str]  # of the signals that are kept between edges, but of arrays
     outputs: set[str]
+    pins: set[str]  # inputs
     locals: dict[str, str]  # types of the variables of the functions
     logic: Names  # signals that depend on others of the same cycle only
     of_inputs: Names  # those that depend on inputs
@@ -236,7 +263,7 @@ class Design:
         for match in filter(None, map(DECLARATION.fullmatch, edge)):
             if own.setdefault(match[2], match[1]) != match[1]:
                 raise FormError(f"{match[2]} has two types")
-        lines = [line for line in edge if not DECLARATION.fullmatch(line)]
+        lines = [RESET.sub(NEVER, line) for line in edge if not DECLARATION.fullmatch(line)]
         used = "\n".join(line for line in lines if not ZERO.fullmatch(line))
         words = {
             name: int(kind[7 : kind.index(">")])
@@ -246,6 +273,7 @@ class Design:
         return cls(
             types,
             set(re.findall(r"VL_OUT\w*\(&?(\w+),", header)),
+            set(re.findall(r"VL_IN\w*\(&?(\w+),", header)),
             own,
             changed(triggered(code, "eval_stl"), words),
             changed(triggered(code, "eval_ico"), words),
@@ -288,10 +316,11 @@ def array(name: str) -> str:
     return name.partition("[")[0]
 
 
-def logic_first(design: Design) -> list[Statement]:
-    """The program of an edge with its logic at the beginning instead of the end, where it sees the
-    inputs of the new cycle. A statement goes there if no statement that stays behind it has to do
-    with what it computes or changes what it uses. Statements of flip-flops never go.
+def logic_first(design: Design) -> tuple[list[Statement], list[Statement]]:
+    """The program of an edge in two parts: its logic, which goes to the beginning instead of the
+    end, where it sees the inputs of the new cycle; and all that stays. A statement goes if no
+    statement that stays behind it has to do with what it computes or changes what it uses.
+    Statements of flip-flops never go.
     """
     stays: set[int] = set()
     while True:
@@ -318,8 +347,8 @@ def logic_first(design: Design) -> list[Statement]:
             computed |= effect.sets
         if len(stays) == count:
             first = set(moved)
-            rest = [s for n, s in enumerate(design.program) if n not in first]
-            return [design.program[n] for n in moved] + rest
+            stay = [s for n, s in enumerate(design.program) if n not in first]
+            return [design.program[n] for n in moved], stay
 
 
 @dataclass
@@ -366,7 +395,7 @@ class Sinker:
             return
         first = min(users | writers, default=n)
         if not users or (first not in users and len(effect.changes) == 1):
-            self.block[n] = None  # it is not used, or computed anew before any use
+            self.block[n] = None  # it is not used, or computed again before any use
             return
         others = [self.block[u] for u in users]
         if writers and users | writers != {first}:
@@ -415,21 +444,229 @@ class Sinker:
         return any(begin < w < end for name in names for w in self.writers[name])
 
 
-def function(design: Design) -> str:
-    """The C++ of `rising_edge`, which evaluates a design whose inputs are set."""
-    program = logic_first(design)
-    whole = effect_of(program)
-    if late := whole.needs & design.of_inputs:
-        raise FormError(f"logic of inputs stays behind: {', '.join(sorted(late))}")
-    kept = {array(name) for name in whole.needs} | design.outputs
-    passing = {array(name) for name in whole.changes} - kept
+@dataclass
+class Rest:
+    """The part of a program that does nothing while the soft core waits. Its inputs are what the
+    other part computes and it needs. An edge at which no input changes, after one that has left
+    the inputs and all of its registers as they were, leaves them as they are again.
+    """
+
+    design: Design
+    program: Sequence[Statement]
+    logic: int  # statements at the beginning that are logic
+    state: set[str] = field(init=False)  # what lasts
+    works: set[int] = field(init=False)  # statements of the other part
+
+    def __post_init__(self) -> None:
+        self.state = {array(name) for name in effect_of(self.program).needs}
+        self.works = set()
+        effects = [statement.effect for statement in self.program]
+        active = {
+            array(name)
+            for effect in effects
+            for name in effect.needs | effect.changes
+            if WORKS.search(name)
+        }
+        units = list(self.units())
+        count = -1
+        while count != len(self.works):
+            count = len(self.works)
+            late = self.late()
+            for unit in units:
+                effect = effect_of(self.program[n] for n in unit)
+                names = {array(name) for name in effect.needs | effect.changes}
+                if unit[0] not in self.works and (names & active or late & set(unit)):
+                    self.works |= set(unit)
+                    changes = {array(name) for name in effect.changes} - self.state
+                    active |= {name for name in changes if not self.is_bit(name)}
+
+    def is_bit(self, name: str) -> bool:
+        """Whether a signal is a single bit, which seldom changes although others do."""
+        types = {**self.design.types, **self.design.locals}
+        return types.get(name, "") == "CData/*0:0*/"
+
+    def units(self) -> Iterator[list[int]]:
+        """The statements by what they change: two that change the same are in the same unit."""
+        first: dict[str, int] = {}
+        unit = list(range(len(self.program)))
+
+        def root(n: int) -> int:
+            while unit[n] != n:
+                n = unit[n]
+            return n
+
+        for n, statement in enumerate(self.program):
+            for name in statement.effect.changes:
+                unit[root(n)] = root(first.setdefault(array(name), n))
+        members: dict[int, list[int]] = defaultdict(list)
+        for n in range(len(self.program)):
+            members[root(n)].append(n)
+        yield from members.values()
+
+    def changes(self, works: bool) -> dict[str, list[int]]:
+        """{signal: the statements of one part that change it}"""
+        found: dict[str, list[int]] = defaultdict(list)
+        for n, statement in enumerate(self.program):
+            if (n in self.works) == works:
+                for name in statement.effect.changes:
+                    found[array(name)].append(n)
+        return found
+
+    def late(self) -> set[int]:
+        """Statements of the resting part that do not see their inputs as they are at the beginning
+        of an edge or after the logic.
+        """
+        changes = self.changes(True)
+        return {
+            n
+            for n, statement in enumerate(self.program)
+            if n not in self.works
+            for name in {array(name) for name in statement.effect.needs}
+            for writer in changes.get(name, [])
+            if (writer < n if name in self.state else writer > n or writer >= self.logic)
+        }
+
+    def needs(self, works: bool) -> set[str]:
+        """What the statements of one part need."""
+        part = effect_of(s for n, s in enumerate(self.program) if (n in self.works) == works)
+        return {array(name) for name in part.needs}
+
+    @cached_property
+    def inputs(self) -> set[str]:
+        """What the resting part needs and does not change itself."""
+        return self.needs(False) - set(self.changes(False))
+
+    @cached_property
+    def results(self) -> set[str]:
+        """What only the logic of the resting part changes and the other part needs."""
+        return self.needs(True) & set(self.changes(False)) - self.state
+
+    @cached_property
+    def logic_inputs(self) -> set[str]:
+        """The inputs that are logic."""
+        return self.inputs & set(self.changes(True)) - self.state
+
+    @cached_property
+    def registers(self) -> set[str]:
+        """What must be as before: the inputs that last, and the registers of the resting part."""
+        lasting = self.inputs - self.logic_inputs | set(self.changes(False)) & self.state
+        return lasting & (set(self.design.types) | self.design.outputs)
+
+
+def text_of(design: Design, program: Sequence[Statement], kept: set[str], stored: set[str]) -> str:
+    """The C++ of a program. Signals are local variables unless they are kept; those that are stored
+    are in `rest`.
+    """
+    passing = {array(name) for name in effect_of(program).changes} - kept
     here = {
-        **design.locals,
-        **{name: design.types[name] for name in sorted(passing & set(design.types))},
+        **{name: kind for name, kind in design.locals.items() if name not in stored},
+        **{name: design.types[name] for name in sorted(passing & set(design.types) - stored)},
     }
     statements = Sinker(frozenset(here) & passing).sunk(program)
     text = "\n".join(line for statement in statements for line in statement.lines())
     text = re.sub(r"\bvlSelfRef\.(\w+)", lambda m: m[1] if m[1] in here else m[0], text)
+    text = re.sub(
+        r"\b(?:vlSelfRef\.)?([A-Za-z_]\w*)",
+        lambda m: f"rest.{m[1]}" if m[1] in stored else m[0],
+        text,
+    )
     used = set(NAME.findall(text))
     variables = "".join(f"{kind} {name};\n" for name, kind in here.items() if name in used)
-    return f"static void rising_edge({ROOT}& vlSelfRef) {{\n{variables}{text}\n}}\n"
+    return variables + text
+
+
+def flagged(text: str, arrays: set[str], flag: str) -> str:
+    """The text with a statement after each assignment to a word of these arrays."""
+    lines = []
+    for line in text.splitlines():
+        lines.append(line)
+        match = ASSIGNMENT.fullmatch(line)
+        changed = {match[1]} if match else set(NAME.findall(line)) if line[:3] == "VL_" else set()
+        if changed & arrays:
+            lines.append(flag)
+    return "\n".join(lines)
+
+
+def differs(kind: str, a: str, b: str) -> str:
+    """An expression that is not 0 if two signals of a type differ."""
+    if kind.startswith("VlWide"):
+        return f"!!std::memcmp(&{a}, &{b}, sizeof {a})"
+    return f"({a} != {b})"
+
+
+def any_of(conditions: Iterable[str]) -> str:
+    """An expression without branches that is not 0 if one of these is not."""
+    return " |\n".join(conditions) or "0"
+
+
+def function(design: Design) -> str:
+    """The C++ of `rising_edge`, which evaluates a design whose inputs are set and whose reset is
+    low, and of the struct `Rest`, in which it remembers from one edge to the next what rests.
+    """
+    logic, flip_flops = logic_first(design)
+    program = [*logic, *flip_flops]
+    whole = effect_of(program)
+    if late := whole.needs & design.of_inputs:
+        raise FormError(f"logic of inputs stays behind: {', '.join(sorted(late))}")
+    serial = any(name.startswith(SERIAL_CORE) for name in design.types)
+    waits = NEVER if serial else WAITS
+    if missing := set(re.findall(r"node__\w+", waits)) - set(design.types):
+        raise FormError(f"there is no {', '.join(sorted(missing))}")
+    rest = Rest(design, program, len(logic))
+    types = {**design.locals, **design.types}
+    arrays = {array(name) for name in whole.changes} - set(types) - design.outputs
+    kept = rest.state | design.outputs | rest.results
+    stored = rest.results & set(design.locals)
+    before = sorted(rest.registers | rest.inputs & design.pins)
+
+    def changed_of(names: Iterable[str]) -> str:
+        return any_of(
+            differs(types.get(name, ""), f"vlSelfRef.{name}", f"rest.before_{name}")
+            for name in names
+        )
+
+    # all logic inputs are stored at a whole edge, and are variables at one that leaves out the rest
+    whole_edge = text_of(design, program, kept | rest.logic_inputs, stored | rest.logic_inputs)
+    logic_changed = any_of(
+        differs(types[name], name, f"rest.{name}") for name in sorted(rest.logic_inputs)
+    )
+    check = Plain(
+        (f"if ({logic_changed}) return false;",),
+        Effect(
+            frozenset(name for name in whole.changes if array(name) in rest.logic_inputs),
+            changes=frozenset(["return"]),
+        ),
+    )
+    working = [statement for n, statement in enumerate(program) if n in rest.works]
+    working.insert(sum(n < len(logic) for n in rest.works), check)
+    partial_edge = text_of(design, working, kept, stored)
+    lines = [
+        "struct Rest {",
+        "bool known = false;",  # nothing but the inputs can change what rests
+        "bool written = false;",  # a memory of what rests was written
+        *(f"{types[name]} {name};" for name in sorted(stored | rest.logic_inputs)),
+        *(f"decltype({ROOT}::{name}) before_{name};" for name in before),
+        "};",
+        # returns false, before it has changed anything, if an input of what rests has changed
+        f"static bool partial_edge({ROOT}& vlSelfRef, Rest& rest) {{",
+        f"if ({changed_of(sorted(rest.inputs & set(before)))}) return false;",
+        flagged(partial_edge, arrays & rest.inputs, "rest.known = false;"),
+        "return true;",
+        "}",
+        f"static void whole_edge({ROOT}& vlSelfRef, Rest& rest) {{",
+        flagged(whole_edge, arrays & set(rest.changes(False)), "rest.written = true;"),
+        "}",
+        f"static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{",
+        "if (rest.known && partial_edge(vlSelfRef, rest)) return;",
+        "rest.known = false;",
+        f"if (!({waits})) {{",
+        "whole_edge(vlSelfRef, rest);",
+        "return;",
+        "}",
+        "rest.written = false;",
+        *(f"rest.before_{name} = vlSelfRef.{name};" for name in before),
+        "whole_edge(vlSelfRef, rest);",
+        f"rest.known = !(rest.written | {changed_of(before)});",
+        "}",
+    ]
+    return "\n".join(lines) + "\n"

@@ -79,7 +79,7 @@ class Bus:
 @cocotb.test()
 async def latency_is_1_and_settings_have_the_units_of_the_engine(dut):
     bus = await Bus(dut).reset()
-    for block, register, value, name, wanted in (
+    for block, register, value, name, expected in (
         ("axis", "kp", 77, "kp", 77),
         ("axis", "ka", 3, "ka", 3 << 8),
         ("axis", "output_limit", 0x7FFF, "output_limit", 0x7FFF << 16),
@@ -93,7 +93,7 @@ async def latency_is_1_and_settings_have_the_units_of_the_engine(dut):
         ("feedback", "velocity_quantum", 9, "quantum", 9),
         ("actuator", "step_trim", 8, "trim_scale", 8),
     ):
-        assert await bus.write(block, register, value) == (OPERANDS[name], wanted)
+        assert await bus.write(block, register, value) == (OPERANDS[name], expected)
     found = await bus.write("axis", "segment_velocity", 0xFFFF_FFFE, value_low=5)
     assert found == (OPERANDS["segment_velocity"], 5 - (2 << 32))
     assert await bus.write("axis", "control", 1) is None
@@ -157,7 +157,7 @@ async def random_words_match_the_model(dut):
             rst=int(random.random() < 0.005),
             stores=stores,
             address=address,
-            value=layout.kept(address, value),
+            value=layout.stored_bits(address, value),
             value_low=random.getrandbits(32),
             setting_waits=int(left > 0),
             moved=random.getrandbits(bus.axes) if random.random() < 0.1 else 0,

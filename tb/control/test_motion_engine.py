@@ -191,13 +191,13 @@ class Engine:
             self.dut.setting_write.value = 0
             await self.until(lambda: not int(self.setting_waits.value), 100)
 
-    def check(self, n, wanted):
-        wanted = [
+    def check(self, n, expected):
+        expected = [
             (kind,) if kind == "underrun" else (kind, wrap(rest[0], 48), *rest[1:])
-            for kind, *rest in wanted
+            for kind, *rest in expected
         ]
-        assert self.got[n] == wanted, (
-            f"tick {self.ticks}, axis {n}:\n{self.got[n]}, the model has\n{wanted}"
+        assert self.got[n] == expected, (
+            f"tick {self.ticks}, axis {n}:\n{self.got[n]}, the model has\n{expected}"
         )
         self.got[n] = []
 
@@ -242,7 +242,7 @@ class Engine:
         self.longest = max(self.longest, cycles)
         positions, steps, lost, lost_off = self.seen
         for n, model in enumerate(self.models):
-            wanted = model.tick(
+            expected = model.tick(
                 position=positions[n],
                 period=self.period,
                 now=self.now,
@@ -256,7 +256,7 @@ class Engine:
             # the engine may have seen the request just before the tick
             if requests and self.got[n][:1] and self.got[n][0][0] == "state":
                 del self.got[n][0]
-            self.check(n, wanted)
+            self.check(n, expected)
         self.gains = [0] * self.axes
         self.ticks += 1
 
@@ -452,7 +452,7 @@ async def a_shift_of_the_origin_never_disturbs_the_error(dut):
         await engine.until(lambda: not int(engine.busy.value), 5000)
         await engine.clk()
         positions, steps, lost, lost_off = engine.seen
-        wanted = model.tick(
+        expected = model.tick(
             positions[0],
             engine.period,
             stepped=steps[0],
@@ -460,7 +460,7 @@ async def a_shift_of_the_origin_never_disturbs_the_error(dut):
             lost=lost[0],
             lost_off=lost_off[0],
         )
-        found = [kind for kind in wanted if kind[0] in ("error", "velocity")]
+        found = [kind for kind in expected if kind[0] in ("error", "velocity")]
         got = [kind for kind in engine.got[0] if kind[0] in ("error", "velocity")]
         assert got == [(kind, *rest) for kind, *rest in found]
         assert before + 65536 * 2 > found[1][1] >= before

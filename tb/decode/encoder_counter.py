@@ -61,7 +61,7 @@ class EncoderCounter:
             clears=self.bit(13),
         )
         mode, later, decoder = self.bit(4, 2), self.index.later, self.decoder
-        direction, moves, _ = decoder.look(later[0], later[1], mode)
+        direction, moves, _ = decoder.classify(later[0], later[1], mode)
         clear = self.index.clear(index, direction)
         if moves:
             self.edge_time = now

@@ -42,7 +42,7 @@ class IncrementalEncoder:
         undefined.
         """
         later, decoder = self.index.later, self.decoder
-        direction, moves, _ = decoder.look(later[0], later[1], setup.mode)
+        direction, moves, _ = decoder.classify(later[0], later[1], setup.mode)
         clear = self.index.clear(setup.index, direction)
         if moves:
             self.edge_time = now

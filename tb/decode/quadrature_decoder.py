@@ -25,7 +25,7 @@ class QuadratureDecoder:
     def ready(self):
         return int(self.settle == 0)
 
-    def look(self, a, b, mode=X4):
+    def classify(self, a, b, mode=X4):
         """(direction, step of count, illegal) of these levels, whether ready or not."""
         if mode == PULSES:
             rise, change = a and not self.a, b != self.b
@@ -38,7 +38,7 @@ class QuadratureDecoder:
         return self.upward, 0, int(moved == 2)
 
     def step(self, a, b, mode=X4, clear=0, rst=0):
-        direction, step, illegal = self.look(a, b, mode)
+        direction, step, illegal = self.classify(a, b, mode)
         if rst or self.settle:
             direction, step, illegal = 1, 0, 0
         self.a, self.b, self.upward = a, b, direction

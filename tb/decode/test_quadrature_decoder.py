@@ -35,7 +35,7 @@ async def drive(dut, model, levels, rst=0, clear=0):
     for cycle, (a, b) in enumerate(levels):
         dut.a.value, dut.b.value = a, b
         await ReadOnly()
-        direction, moves, _ = model.look(a, b, model.mode)
+        direction, moves, _ = model.classify(a, b, model.mode)
         assert (int(dut.direction.value), int(dut.stepping.value), int(dut.ready.value)) == (
             direction,
             abs(moves),

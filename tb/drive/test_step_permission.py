@@ -49,8 +49,8 @@ async def latency_is_0(dut):
 async def all_levels_match_the_model(dut):
     for levels in itertools.product((0, 1), repeat=len(LEVELS)):
         for velocity in (-1, 0, 1):
-            wanted = permission(*levels, velocity > 0, velocity < 0)
-            assert await answer(dut, levels, velocity) == wanted
+            expected = permission(*levels, velocity > 0, velocity < 0)
+            assert await answer(dut, levels, velocity) == expected
 
 
 def test_step_permission():

@@ -67,7 +67,7 @@ def test_a_missing_bound_in_the_firmware_is_found(tmp_path):
     shutil.copytree(FIRMWARE, copy)
     right = (copy / "bus" / "bus.c").read_text()
     wrong = right.replace(
-        "if (!receiving || received == sizeof request) continue;", "if (!receiving) continue;"
+        "if (!receiving || received == sizeof request) return;", "if (!receiving) return;"
     )
     assert wrong != right
     (copy / "bus" / "bus.c").write_text(wrong)

@@ -77,6 +77,7 @@ IDENTITY = dict(
     quadrature_error=0,
     cosine=(0,) * ORDERS,
     sine=(0,) * ORDERS,
+    shift=0,
 )
 
 
@@ -86,7 +87,10 @@ def fits(values):
         and abs(values["quadrature_error"]) <= 65536
         and abs(values["sin_offset"]) <= 16384
         and abs(values["cos_offset"]) <= 16384
-        and all(abs(quotient(v, 2)) <= 1 << 20 for v in (*values["cosine"], *values["sine"]))
+        and all(
+            abs(quotient(v, 2)) <= 1 << 20
+            for v in (*values["cosine"], *values["sine"], values["shift"])
+        )
     )
 
 
@@ -186,7 +190,7 @@ def table_entry(values, point):
         + values["sine"][k] * sine_at((k + 1) * point * 2)
         for k in range(ORDERS)
     )
-    return clamp(total + (1 << 18) >> 19, 0x1FFFF)
+    return clamp(total + (values["shift"] << 15) + (1 << 18) >> 19, 0x1FFFF)
 
 
 def table_of(values):

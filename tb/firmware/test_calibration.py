@@ -4,6 +4,7 @@ check refuses with its reason, values are stored and restored.
 """
 
 import ctypes
+import itertools
 import math
 import random
 
@@ -14,6 +15,9 @@ from figures import calibration as signals
 from tb.bench import seed
 from tb.firmware import calibration_model as model
 from twin.compiled.calibration import (
+    CALIBRATES,
+    FOLLOWS,
+    FROZEN,
     LOADING,
     NOTHING,
     PHASES,
@@ -176,6 +180,7 @@ def test_any_values_give_the_table_of_the_model_held_to_18_bits():
         values = Values()
         values.cosine[:] = [draw.randint(-size, size) for _ in range(model.ORDERS)]
         values.sine[:] = [draw.randint(-size, size) for _ in range(model.ORDERS)]
+        values.shift = draw.randint(-size, size)
         for point in range(0, 256, 5):
             entry = library().harmonics_table_entry(ctypes.byref(values), point)
             assert entry == model.table_entry(values.as_dict(), point) and -131072 < entry < 131072
@@ -246,7 +251,7 @@ def test_a_calibration_waits_while_another_one_works_on_its_burst():
         "open", ctypes.c_uint16(1), False
     )
     assert second.calibration.need == PHASES and second.calibration.refused == 0
-    first.call("freeze", True)  # releases its burst
+    first.call("set_mode", FROZEN)  # releases its burst
     assert second.phases(line(15)) == model.RUNNING and second.calibration.pass_.bursts == 1
 
 
@@ -334,11 +339,23 @@ def test_a_vibration_locked_to_the_fringe_at_one_of_two_speeds_is_subtracted(mul
     )
 
 
-def test_vibrations_locked_to_the_fringe_at_each_speed_are_refused():
-    speeds = iter([600, 700] * 100)
-    machine, *_ = signals.calibrated(3, (600, 700), speeds=lambda: next(speeds))
+@pytest.mark.parametrize("fringes", [610, 5200])
+def test_vibrations_locked_to_the_fringe_at_each_speed_are_refused(fringes):
+    """By a pass of usual length, and by one that was made longer in vain."""
+    speeds = itertools.cycle([600, 700])
+    machine, *_ = signals.calibrated(3, (600, 700), speeds=lambda: next(speeds), fringes=fringes)
     assert machine.calibration.reason == model.VIBRATION
+    assert machine.calibration.refused == (fringes > 610)
     assert not machine.calibration.complete and not any(machine.values["cosine"])
+
+
+def test_a_broadband_vibration_is_averaged_out_by_a_longer_pass():
+    machine, left, _ = signals.broadband(1, 4800)
+    assert machine.calibration.accepted == 2 and machine.calibration.complete
+    assert machine.calibration.refused == 0 and left <= 0.3
+    early, left, _ = signals.broadband(1, 2000)
+    assert early.calibration.reason == model.VIBRATION and not early.calibration.complete
+    assert early.calibration.pass_.bursts > model.PASS and left > 3
 
 
 def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():
@@ -346,8 +363,8 @@ def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():
     assert machine.calibration.reason == model.ONE_SPEED
     assert not machine.calibration.complete and not any(machine.values["cosine"])
     draw = random.Random(1)
-    machine.call("freeze", True)  # a pass of the same signal from its start
-    machine.call("freeze", False)
+    machine.call("set_mode", FROZEN)  # a pass of the same signal from its start
+    machine.call("set_mode", CALIBRATES)
     machine.calibration.reason = model.ONE_SPEED
     for _ in range(model.PASS - 1):  # the reason of a refused pass stays while the next one runs
         assert machine.phases(line(draw.uniform(12, 18))) == model.ONE_SPEED
@@ -392,20 +409,111 @@ def test_values_out_of_range_are_not_restored():
 def test_frozen_values_stay_and_calibration_continues_when_unfrozen():
     machine, _ = calibrated()
     values = machine.values
-    machine.call("freeze", True)
+    machine.call("set_mode", FROZEN)
     assert machine.calibration.need == NOTHING
     for periods in (12, 15, 18) * 20:
         machine.phases(line(periods))
     assert machine.values == values and machine.calibration.reason == model.FROZEN
-    machine.call("freeze", False)
+    machine.call("set_mode", CALIBRATES)
     assert machine.calibration.need == PHASES and machine.calibration.pass_.bursts == 0
     machine.phases(line(15))
     assert machine.calibration.reason == model.RUNNING and machine.values == values
 
 
+def drifted_samples(offset=(0.0, 0.0), gain=1.0, phase=0.0):
+    """Samples of a circle whose harmonic +3 an ellipse takes for its own, in part."""
+    angles = np.linspace(0, math.tau * 15, 2048, endpoint=False)
+    cos, sin = (
+        np.cos(angles) + 0.01 * np.cos(3 * angles),
+        np.sin(angles) + 0.01 * np.sin(3 * angles),
+    )
+    bent = np.stack(
+        [cos + offset[0], gain * (sin * math.cos(phase) + cos * math.sin(phase)) + offset[1]]
+    )
+    return [tuple(one) for one in np.rint(bent.T * 0.8 * 32767).astype(int).tolist()]
+
+
+def drifted(*errors, **named):
+    """The two bursts of an ellipse of these samples."""
+    samples = drifted_samples(*errors, **named)
+    return [words(samples[:1024]), words(samples[1024:])]
+
+
+def follow(machine, bursts):
+    for burst in bursts:
+        reason = machine.burst(burst)
+    return reason
+
+
+def test_following_adds_what_the_ellipse_has_changed_and_keeps_the_harmonics():
+    machine, curve = calibrated()
+    values = machine.values
+    accepted, loads, table = machine.calibration.accepted, machine.loads, machine.table
+    machine.call("set_mode", FOLLOWS)
+    assert machine.calibration.need == SAMPLES
+    # the first ellipse is the reference, whatever it is: nothing changes
+    assert follow(machine, drifted()) == model.RUNNING
+    assert machine.values == values and machine.loads == loads
+    assert machine.calibration.referenced and machine.calibration.accepted == accepted
+    # the second one has drifted
+    assert follow(machine, drifted((0.02, -0.01), 1.03, 0.02)) == model.RUNNING
+    _, plain = fit(drifted_samples())
+    _, moved = fit(drifted_samples((0.02, -0.01), 1.03, 0.02))
+    for name in ("sin_offset", "cos_offset", "gain", "quadrature_error"):
+        assert machine.values[name] - values[name] == moved[name] - plain[name] != 0, name
+    assert machine.values["cosine"] == values["cosine"] and machine.values["sine"] == values["sine"]
+    # half of what the quadrature error turns the phase by, in every point of the table
+    turned = (
+        (machine.values["quadrature_error"] - values["quadrature_error"]) / 65536 / 2 / math.tau
+    )
+    assert machine.values["shift"] == pytest.approx(turned * 2**24, abs=1) and abs(turned) > 1e-3
+    assert np.subtract(machine.table, table) == pytest.approx(turned * 2**20, abs=1)
+    assert machine.calibration.accepted == accepted + 1 and machine.loads == loads + 1
+    assert machine.calibration.complete
+    # and back again
+    follow(machine, drifted())
+    assert machine.values == values
+
+
+def test_following_survives_a_pause_but_not_new_values():
+    machine, _ = calibrated()
+    machine.call("set_mode", FOLLOWS)
+    values = machine.values
+    follow(machine, drifted())
+    machine.call("set_mode", FROZEN)
+    assert machine.calibration.need == NOTHING and machine.calibration.referenced
+    machine.call("set_mode", FOLLOWS)
+    follow(machine, drifted((0.02, 0.0)))
+    assert machine.values["cos_offset"] > values["cos_offset"]  # what drifted in the pause, too
+    assert machine.call("restore", ctypes.byref(Values(gain=70000)))
+    assert machine.idle() == SAMPLES and not machine.calibration.referenced
+    follow(machine, drifted((0.02, 0.0)))
+    assert machine.values["gain"] == 70000
+    machine.call("forget")
+    assert machine.idle() == SAMPLES and not machine.calibration.referenced
+    follow(machine, drifted())
+    assert machine.values == model.IDENTITY
+
+
+def test_following_refuses_what_gives_no_ellipse_or_leaves_the_range():
+    machine = fresh()
+    limits = Values(gain=131000, sin_offset=0, cos_offset=0)
+    assert machine.call("restore", ctypes.byref(limits))
+    machine.call("set_mode", FOLLOWS)
+    machine.idle()
+    follow(machine, drifted())
+    before, refused = machine.values, machine.calibration.refused
+    still = [words([(20000, 100)] * 1024)] * 2
+    assert follow(machine, still) == model.STANDSTILL
+    assert machine.calibration.ellipse.count == 0 and machine.calibration.need == SAMPLES
+    assert follow(machine, drifted(gain=0.9)) == model.DISTORTED  # the gain would be 2.2
+    assert machine.values == before and machine.calibration.refused == refused + 2
+    assert follow(machine, drifted(gain=1.1)) == model.RUNNING and machine.values["gain"] < 131000
+
+
 def test_restored_values_are_loaded_even_if_frozen():
     machine = fresh()
-    machine.call("freeze", True)
+    machine.call("set_mode", FROZEN)
     assert (
         machine.call("restore", ctypes.byref(Values(gain=70000)))
         and machine.calibration.need == LOADING
@@ -429,7 +537,7 @@ def test_forgetting_starts_from_scratch():
 
 def test_a_word_that_was_not_requested_changes_nothing():
     machine = fresh()
-    machine.call("freeze", True)
+    machine.call("set_mode", FROZEN)
     before = bytes(machine.calibration)
     machine.call("take", (ctypes.c_uint32 * 4)(0x12345678))
     machine.call("work")

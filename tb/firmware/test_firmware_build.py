@@ -100,6 +100,15 @@ def test_a_counter_has_no_planner_and_needs_a_quarter_of_the_memory(made, tmp_pa
     assert program < whole / 4
 
 
+def test_steps_for_eight_axes_fit_64_kib_and_know_no_sine(tmp_path):
+    run = build(tmp_path, "--image", "steps", "--memory", "65536")
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith("steps: ") and " of 65536, " in run.stdout
+    names = functions(tmp_path / "steps.elf")
+    assert {"planner_move", "homing_poll", "scope_operation"} <= names
+    assert not {"calibration_open", "harmonics_table_entry", "ellipse_take"} & names
+
+
 def test_nothing_is_built_twice(made):
     before = (made[0] / "firmware.elf").stat().st_mtime_ns
     assert build(made[0]).stdout == made[1]

@@ -238,12 +238,46 @@ def test_a_burst_is_begun_again_when_the_speed_changed_twofold():
     machine.axes[0].speed = speed(100)
     machine.poll(3)
     assert len(channel.records) == 2 and channel.records[1][1] < channel.records[0][1] / 2
-    machine.axes[0].speed = speed(120)
-    machine.poll(3)
-    assert len(channel.records) == 2
+    for periods in (120, 40):  # samples may be from any speed
+        machine.axes[0].speed = speed(periods)
+        machine.poll(3)
+        assert len(channel.records) == 2
     machine.axes[0].speed = 0
     machine.poll(3)
     assert len(channel.records) == 2 and calibration(machine)["reason"] == "standstill"
+
+
+def test_a_burst_of_phases_is_begun_again_at_half_the_speed_too():
+    machine = moving(learning=False)
+    channel = machine.feedback_channels[0]
+    machine.ask("set_correction", axis=0, apply=1, **VALUES)
+    machine.poll(50)
+    channel.delay = 10**6
+    machine.axes[0].speed = speed(120)
+    calibration(machine, "calibrate")
+    machine.poll(3)
+    machine.axes[0].speed = speed(40)
+    machine.poll(3)
+    assert [phases for phases, _ in channel.records[-2:]] == [True, True]
+    assert channel.records[-1][1] > 2 * channel.records[-2][1]
+
+
+def test_an_axis_that_follows_records_samples_and_leaves_the_rest_alone():
+    machine = moving(learning=False)
+    channel = machine.feedback_channels[0]
+    machine.ask("set_correction", axis=0, apply=1, **VALUES)
+    machine.poll(50)
+    loads = channel.loads
+    assert calibration(machine, "follow")["frozen"] == 0
+    known = dict(axis=0, parameter=PARAMETER["auto_calibration"]["id"])
+    assert machine.ask("get_parameter", **known)["value"] == 2
+    machine.poll(400)
+    assert channel.records and not any(phases for phases, _ in channel.records)
+    assert calibration(machine)["reason"] == "calibrating"
+    assert correction(machine) == VALUES and channel.loads >= loads
+    assert calibration(machine)["converged"] == 1
+    calibration(machine, "freeze")
+    assert machine.ask("get_parameter", **known)["value"] == 0
 
 
 def test_a_spoiled_burst_is_refused_with_its_reason():
@@ -323,7 +357,7 @@ def test_stored_values_come_into_force_together():
         ("set_harmonic", dict(order=1, cosine=0, sine=-(2**31))),
         ("get_harmonic", dict(order=0)),
         ("get_harmonic", dict(order=11)),
-        ("calibration", dict(action=4)),
+        ("calibration", dict(action=5)),
     ],
 )
 def test_values_out_of_range_are_refused_and_change_nothing(name, values):

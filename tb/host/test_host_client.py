@@ -910,6 +910,46 @@ def test_saved_parameters_are_restored_to_the_last_bit():
         assert fresh.period_nm == Fraction(counts["period"], 1000)
 
 
+@pytest.mark.parametrize(
+    "before, loaded",
+    [
+        ({"step_output": 1}, {"position_source": "own_steps", "step_output": "step_and_direction"}),
+        ({"position_source": 2}, {"step_output": "quadrature", "position_source": "counts"}),
+        ({"fine_reach": 5}, {"drive": "dac", "fine_reach": "0nm"}),
+        ({"drive": 2}, {"fine_reach": "100nm", "drive": "bridge"}),
+        ({"segments": 2}, {"segment_count": "7", "segments": "off"}),
+    ],
+)
+def test_parameters_that_exclude_each_other_are_loaded_in_any_order(before, loaded):
+    for texts in (loaded, dict(reversed(loaded.items()))):
+        wire, node, axis = stage()
+        for name, value in before.items():
+            node.force(name, value)
+        axis.load_parameters({"kp": "0.5", **texts})
+        assert {name: axis.get_parameter(name).written() for name in loaded} == loaded
+
+
+@pytest.mark.parametrize(
+    "before, name, value, words",
+    [
+        ({"step_output": 2}, "position_source", "own_steps", "step_output pulses"),
+        ({"position_source": 2}, "step_output", "pulses", "step_output pulses"),
+        ({"drive": 2}, "fine_reach", "100nm", "drive dac and fine_reach 100nm"),
+        ({"fine_reach": 65536}, "drive", "dac", "drive dac and fine_reach 800nm"),
+    ],
+)
+def test_parameters_that_exclude_each_other_are_refused_before_any_is_written(
+    before, name, value, words
+):
+    wire, node, axis = stage()
+    for partner, count in before.items():
+        node.force(partner, count)
+    for change in (axis.set_parameter, lambda *one: axis.load_parameters(dict([("kp", 1), one]))):
+        with pytest.raises(OutOfRange, match=f"{words} do not go together"):
+            change(name, value)
+    assert "set_parameter" not in node.executed
+
+
 def test_a_file_with_one_wrong_value_writes_nothing():
     wire, node, axis = stage()
     for wrong in (

@@ -656,6 +656,14 @@ def test_baud_and_parity_reach_the_port():
     assert call.options.baud == 9600
 
 
+@pytest.mark.parametrize("option, patience_s", [("", 0.1), ("--patience 2s", 2)])
+def test_each_of_five_tries_has_the_patience_that_is_given(option, patience_s):
+    bus = Rs485Bus(BusNode())
+    bus.from_nodes = lambda word: []
+    assert "asked 5 times" in sentence(Call(f"status {option}", bus=bus), 3)
+    assert 5 * patience_s < bus.now() < 5 * patience_s + 0.1
+
+
 def test_help_names_every_command_and_gives_examples(capsys):
     for arguments, message in (
         (["--help"], "moire --port twin home -- move 1mm -- status"),

@@ -108,7 +108,7 @@ def test_a_calibration_that_takes_too_long_fails_with_its_reason():
     node.set(velocity=900)
     with pytest.raises(
         NotCalibrated,
-        match="learned no correction within 3s: calibrating \\(0 accepted, 0 refused\\)",
+        match="found no correction within 3s: calibrating \\(0 accepted, 0 refused\\)",
     ) as caught:
         axis.calibrate(timeout="3s")
     assert (

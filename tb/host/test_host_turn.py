@@ -186,5 +186,5 @@ def test_the_commands_turn_the_table_and_report_its_angle(tmp_path):
     assert code == 0 and "0.5arcsec" in out
     file.write_text("[]")
     code, _, err = panel.call(f"settings load {file}")
-    assert code == 2 and "has no settings" in err
+    assert code == 2 and "holds no settings" in err
     assert len(panel.call("settings list")[1].splitlines()) == len(SETTINGS)

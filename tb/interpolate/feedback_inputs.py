@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settings and idle inputs of feedback_channel for its tests: no filters, no monitor, no motion."""
 
+from cocotb.triggers import FallingEdge
+
+from tb.bench import start
+
 SETTINGS = dict(
     deglitch=0,
     amplitude_low=0,
@@ -42,3 +46,9 @@ INPUTS = dict(
     chain_disagreement=0,
     chain_lost=0,
 )
+
+
+async def begin(dut, **levels):
+    """Start the design with these levels and else idle inputs, and let one cycle pass."""
+    await start(dut, **SETTINGS, **{**INPUTS, **levels})
+    await FallingEdge(dut.clk)

@@ -24,6 +24,7 @@ class HarmonicCorrection:
     def reset(self):
         self.page, self.swapped = [0] * len(self.tables), [False] * len(self.tables)
         self.flow, self.out = [None] * (LATENCY - 1), 0
+        self.waiting = None  # (table, point, value) of an entry that is not stored yet
 
     def in_force(self, axis=0):
         return self.tables[axis][self.page[axis]]
@@ -35,8 +36,12 @@ class HarmonicCorrection:
         acts = enable >> axis & 1 and self.swapped[axis]
         out = corrected(phase, self.in_force(axis)) if acts else phase
         self.flow.append(out if valid else None)
+        if self.waiting and not valid:
+            table, point, value = self.waiting
+            table[point] = value
+            self.waiting = None
         if write:
-            self.tables[table_axis][self.page[table_axis] ^ 1][write[0]] = write[1]
+            self.waiting = self.tables[table_axis][self.page[table_axis] ^ 1], *write
         if rst:
             self.reset()
             return 0, 0

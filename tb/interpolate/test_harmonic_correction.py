@@ -53,6 +53,7 @@ async def cycle(
 async def load(dut, model, table, axis=0):
     for entry in enumerate(table):
         await cycle(dut, model, write=entry, table_axis=axis)
+    await cycle(dut, model)
     await cycle(dut, model, swap=1, table_axis=axis)
 
 
@@ -99,11 +100,28 @@ async def the_line_closes_over_the_period_and_the_phase_wraps(dut):
 async def nothing_is_corrected_before_the_first_swap_or_by_a_partially_written_table(dut):
     model = await begin(dut)
     for entry in enumerate([1600] * POINTS):
-        assert await cycle(dut, model, 1, 777, write=entry) in ((0, 0), (1, 777))
+        assert await cycle(dut, model, 1, 777, write=entry) in ((0, 0), (0, 777), (1, 777))
+        await cycle(dut, model)
     assert await ask(dut, model, 777, swap=1) == 677
     for entry in enumerate([3200] * POINTS):
         assert (await cycle(dut, model, 1, 777, write=entry))[1] in (677,)
+        await cycle(dut, model)
     assert await ask(dut, model, 777, swap=1) == 577
+
+
+@cocotb.test()
+async def an_entry_is_stored_in_the_next_cycle_without_a_phase(dut):
+    model = await begin(dut)
+    await cycle(dut, model, 1, write=(3, 160))
+    for _ in range(5):
+        await cycle(dut, model, 1)
+    await cycle(dut, model, 1, swap=1)  # a swap does not move it into the other table
+    await cycle(dut, model)
+    assert await ask(dut, model, 3 * 256) == 3 * 256 - 10
+    await cycle(dut, model, 1, write=(3, 320))
+    await cycle(dut, model, 1, write=(3, 480))  # takes the place of the one before
+    await cycle(dut, model)
+    assert await ask(dut, model, 3 * 256, swap=1) == 3 * 256 - 30
 
 
 @cocotb.test()

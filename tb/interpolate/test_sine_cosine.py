@@ -24,21 +24,10 @@ LATENCY = 22  # cycles from an ADC word to its position
 ARCTAN = arctan_rotation.quarter_bound(
     arctan_rotation.PIPELINED, 16
 )  # LSB of phase; a corrected channel has half of the size of 16 bits
-SETTINGS = dict(
-    outlier_step=0,
-    outlier_hold=0,
-    load=0,
-    sin_offset=0,
-    cos_offset=0,
-    gain=1 << 16,
-    quadrature_error=0,
-    enable=0,
-    write=0,
-    point=0,
-    value=0,
-    swap=0,
-    shift_periods=0,
+INPUTS = dict(
+    setting=0, setting_written=0, harmonic_enable=0, shift_periods=0, valid=0, sin=0, cos=0
 )
+OFFSETS, GAIN, LOAD, POINT, SWAP = 2, 3, 5, 6, 7  # strobes of interpolation_chain
 AMPLITUDE = 0.84  # of full scale: leaves room for the disturbances
 CLEAN = dict(offset=0.0, gain=0.0, phase=0.0, noise=0.0)
 DISTURBED = {  # offset, gain: of the amplitude; phase: degrees; noise: of full scale
@@ -158,7 +147,7 @@ class Chain:
 
 
 async def begin(dut):
-    await start(dut, valid=0, sin=0, cos=0, **SETTINGS)
+    await start(dut, **INPUTS)
     await FallingEdge(dut.clk)
 
 
@@ -166,6 +155,15 @@ async def again(dut):
     dut.rst.value = 1
     await FallingEdge(dut.clk)
     dut.rst.value = 0
+
+
+async def write(dut, strobe, value=0):
+    """Write a setting of the chain: its value, and its strobe in the next cycle."""
+    dut.setting.value = value
+    await FallingEdge(dut.clk)
+    dut.setting_written.value = 1 << strobe
+    await FallingEdge(dut.clk)
+    dut.setting_written.value = 0
 
 
 async def follow(dut, sin, cos):
@@ -195,22 +193,13 @@ async def latency_is_22_from_an_adc_word_to_position(dut):
 async def latency_is_22_with_a_correction_and_harmonics_too(dut):
     await begin(dut)
     w = int(dut.W.value)
-    dut.load.value, dut.sin_offset.value, dut.gain.value, dut.enable.value = (
-        1,
-        10 << 16 - w,
-        1 << 15,
-        1,
-    )
+    await write(dut, OFFSETS, 10 << 16 - w)
+    await write(dut, GAIN, 1 << 15)
+    await write(dut, LOAD)
     for point in range(256):
-        dut.write.value, dut.point.value, dut.value.value, dut.swap.value = (
-            1,
-            point,
-            160,
-            int(point == 255),
-        )
-        await FallingEdge(dut.clk)
-        dut.load.value = 0
-    dut.write.value, dut.swap.value = 0, 0
+        await write(dut, POINT, point << 18 | 160)
+    await write(dut, SWAP)
+    dut.harmonic_enable.value = 1
     await FallingEdge(dut.clk)  # sin (90 - 10) / 2 = 40 = cos: an eighth, less 160 / 2^20 period
     assert await follow(dut, 90, 40) == 8192 - 10
 

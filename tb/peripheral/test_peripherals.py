@@ -124,7 +124,7 @@ class Peripherals:
             1 - (int(d.edm_data_low.value) | m.data_low),
         )
         self.peer.receive(int(d.peer_tx.value))
-        self.look(int(d.display_cs_n.value), int(d.display_sclk.value))
+        self.read_display(int(d.display_cs_n.value), int(d.display_sclk.value))
         inputs = dict(
             i2c_scl=lines[0],
             i2c_sda=lines[1],
@@ -140,7 +140,7 @@ class Peripherals:
             if int(getattr(d, name).value) != level:
                 getattr(d, name).value = level
 
-    def look(self, cs_n, sclk):
+    def read_display(self, cs_n, sclk):
         """Read the pins as a MAX7219 does: a bit at each rise of sclk, the word at the rise of
         cs_n.
         """

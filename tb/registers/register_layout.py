@@ -53,7 +53,7 @@ class RegisterLayout:
         register, high, axis = self.entries.get(address, (None, 0, 0))
         return bool(register and high and self.there(register, axis))
 
-    def kept(self, address, wdata):
+    def stored_bits(self, address, wdata):
         """What a write to the word stores; of a low word nothing."""
         register, high, axis = self.entries.get(address, (None, 0, 0))
         if not register or register.wide and not high:

@@ -25,7 +25,7 @@ class RegisterMemory:
         if not self.ready:
             return None if hold else (self.count, self.layout.first(self.count))
         if select and write and not self.layout.low(address):
-            return address, self.layout.kept(address, wdata)
+            return address, self.layout.stored_bits(address, wdata)
         return None
 
     def step(self, hold=0, select=0, write=0, address=0, wdata=0, rst=0):
@@ -38,7 +38,7 @@ class RegisterMemory:
         elif self.commit is not None:
             self.memory[self.commit] = self.wdata_low
         elif select and write and not layout.low(address):
-            self.memory[layout.place(address)] = layout.kept(address, wdata)
+            self.memory[layout.place(address)] = layout.stored_bits(address, wdata)
         elif select and not write:
             self.rdata = self.memory[layout.place(address)]
         self.commit = None

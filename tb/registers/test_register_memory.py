@@ -128,7 +128,7 @@ async def each_word_keeps_its_own_bits(dut):
     for address in words:
         await bus.write(address, data[address])
     for address in words:
-        assert await bus.read(address) == layout.kept(address, data[address])
+        assert await bus.read(address) == layout.stored_bits(address, data[address])
 
 
 @cocotb.test()

@@ -15,7 +15,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from moire.made import bus_tables
 from moire.made import registers as host
 from tables import registers as tables
-from tb.bench import BENCHES, ROOT, run, start
+from tb.bench import BENCHES, ROOT, rtl_only, run, start
 from tb.registers.register_block import WORD, RegisterBlock
 
 
@@ -137,6 +137,7 @@ async def latency_is_1(dut):
     r, f = next((r, f) for r, f in bus.of("input"))
     bus.inputs[f.port] = 1
     await bus.clk(1, 0, r.word)
+    rtl_only("it reads rdata of the block, which is inside of the bench")
     assert int(dut.u_block.rdata.value) >> f.low & 1 == 1
     await bus.clk()
     assert int(dut.u_block.rdata.value) == 0
@@ -246,6 +247,7 @@ async def strobes_last_one_clk(dut):
 @cocotb.test()
 async def counters_count_clear_and_stop_at_the_end(dut):
     """A counter in a memory needs some cycles for each event."""
+    rtl_only("it sets counters inside, since they are too long to be counted to their end")
     bus = await Bus(dut).begin()
     for r, f in bus.of("counter"):
         port, pause = f.port, 2 if f.in_memory else 0
@@ -309,10 +311,10 @@ async def a_setting_whose_need_was_not_built_reads_zero_whatever_is_written(dut)
 def bench(name):
     """Write the top that joins a block with the register memory, as the soft core reads them."""
     block = next(b for b in tables.read() if b.name == name)
-    ports = [(kind, shape, port) for kind, shape, port, _ in block.ports]
+    ports = [(kind, shape, port) for kind, shape, port, _, _ in block.ports]
     low = [".wdata_low"] if block.wide_settings else []
     passed = ", ".join(f".{p}({p})" for p in block.parameters)
-    kept = ", ".join(f".{p}({p})" for p in needs_of(block))
+    masks = ", ".join(f".{p}({p})" for p in needs_of(block))
     parameters = ", ".join(f"parameter int {p} = 1" for p in needs_of(block))
     lines = [
         f"module {name}_bench {f'#({parameters})' if parameters else ''}",
@@ -322,7 +324,7 @@ def bench(name):
         ",\n".join(" ".join(port) for port in ports),
         "); wire [31:0] live, settings, wdata_low, stored_value; wire [13:0] stored_at;",
         "wire stores; logic got;",
-        f"register_memory #({kept}) u_memory (.clk, .rst, .hold(1'b0), .select, .write,",
+        f"register_memory #({masks}) u_memory (.clk, .rst, .hold(1'b0), .select, .write,",
         f".address({{8'd{block.base // 256}, word}}), .wdata, .ready, .rdata(settings),",
         ".wdata_low, .stores, .stored_at, .stored_value);",
         f"{name}_registers #({passed}) u_block (",

@@ -95,6 +95,7 @@ async def latency_is_time_ms_to_1_ms_more_and_2_cycles(dut):
 
 @cocotb.test()
 async def the_longest_time_is_filtered_exactly(dut):
+    bench.rtl_only("it sets a counter inside, since 65 s are too long")
     contacts = Contacts(dut)
     contacts.time_ms = 0xFFFF
     await contacts.begin(0)

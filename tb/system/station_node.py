@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes of S4 in the tests of whole stations: what they are built with, and the parameters of
-the axis that turns the table.
+"""The nodes of S4 in the tests of whole stations: a twin of them, the bus to it, and the parameters
+of the axis that turns the table.
 """
 
-from twin.nodes.twin import drives
+import random
+from collections.abc import Sequence
+from typing import Any
+
+from moire.client.bus import Bus
+from tb.bench import seed
+from twin import Twin, TwinTransport, build
+from twin.nodes.twin import Node, drives
 
 NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 AXIS = {
@@ -28,3 +35,24 @@ AXIS = {
     "settle_time": "5ms",
     "watchdog_time": "60s",
 }
+
+
+def station_twin(nodes: Sequence[Node], **more: Any) -> Twin:
+    """A twin of nodes with the image `station`; more: further arguments of Twin."""
+    return Twin(
+        nodes,
+        seed=seed() % 1000,
+        node_parameters=NODE,
+        firmware=build.firmware("station"),
+        peer_baud=115200,
+        **more,
+    )
+
+
+def station_bus(twin: Twin, address: int) -> Bus:
+    """The bus of a twin, after the parameters of the table's axis were set in this node."""
+    bus = Bus(TwinTransport(twin), random_source=random.Random(seed()), poll_s=0.1)
+    bus.transport.wait(0.1)
+    for name, value in AXIS.items():
+        bus.axis(address).set_parameter(name, value)
+    return bus

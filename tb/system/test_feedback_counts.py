@@ -11,8 +11,8 @@ import pytest
 from cocotb.triggers import FallingEdge
 
 from moire.made.registers import FIELDS
-from tb.bench import needs, run, seed, start
-from tb.interpolate.feedback_inputs import INPUTS, SETTINGS
+from tb.bench import needs, run, seed
+from tb.interpolate.feedback_inputs import begin
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 QUARTER = 1 << 14
@@ -38,8 +38,8 @@ class Bench:
     async def begin(cls, dut, count=0, mode=0, steps=0):
         bench = cls()
         bench.dut, bench.count, bench.latency = dut, count, latency(dut)
-        await start(dut, **SETTINGS, **{**INPUTS, **dict(zip("ab", TURN[count % 4]))})
-        for _ in range(12):  # after reset, filter and decoder only take over the levels
+        await begin(dut, **dict(zip("ab", TURN[count % 4])))
+        for _ in range(11):  # after reset, filter and decoder only take over the levels
             await FallingEdge(dut.clk)
         await bench.write("decoder_mode", value=mode)
         await bench.write("position_source", counts=1, steps=steps)

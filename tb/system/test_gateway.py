@@ -22,6 +22,7 @@ from moire.client.bus import Bus
 from moire.errors import BusGarbled, NoAnswer
 from twin import Twin, TwinTransport
 
+PATIENCE = "60s"  # of the clock: the twin is slow on a busy computer, and loses no answer
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings(
     "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
@@ -59,7 +60,8 @@ def ports():
 
 def moire(*arguments, code=0):
     out, err = io.StringIO(), io.StringIO()
-    assert command_line.main([*arguments, "--json"], None, out, err) == code, out.getvalue()
+    words = [*arguments, "--patience", PATIENCE, "--json"]
+    assert command_line.main(words, None, out, err) == code, out.getvalue()
     return [json.loads(row) for row in out.getvalue().splitlines()]
 
 

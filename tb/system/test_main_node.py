@@ -4,15 +4,11 @@ panel and machine, and a power cut.
 """
 
 import math
-import random
 
-from moire.client.bus import Bus
 from moire.client.indexing_table import TURN, IndexingTable
 from moire.client.job import Job
 from moire.client.settings import Settings
-from tb.bench import seed
-from tb.system.station_node import AXIS, NODE
-from twin import Twin, TwinTransport, build
+from tb.system.station_node import station_bus, station_twin
 from twin.devices.devices import Devices
 from twin.nodes.twin import Axis, Node
 
@@ -30,18 +26,8 @@ DEVICES = Devices(
 
 def test_a_job_is_cut_at_its_angles_through_a_power_cut_and_no_station_twice():
     nodes = [Node(1, [Axis("unconnected")], DEVICES), Node(2, [Axis("worm_table")])]
-    with Twin(
-        nodes,
-        seed=seed() % 1000,
-        node_parameters=NODE,
-        firmware=build.firmware("station"),
-        peers=(MAIN, SUB),
-        peer_baud=115200,
-    ) as twin:
-        bus = Bus(TwinTransport(twin), random_source=random.Random(seed()), poll_s=0.1)
-        bus.transport.wait(0.1)
-        for name, value in AXIS.items():
-            bus.axis(2).set_parameter(name, value)
+    with station_twin(nodes, peers=(MAIN, SUB)) as twin:
+        bus = station_bus(twin, 2)
         for address, role in ((1, "main"), (2, "sub")):
             Settings(bus.node(address)).set("peer_role", role)
             Settings(bus.node(address)).set("peer_mode", "frames")

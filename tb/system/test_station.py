@@ -5,7 +5,6 @@ angles of its sensor.
 
 import io
 import math
-import random
 import re
 from pathlib import Path
 
@@ -17,10 +16,9 @@ from moire.client.indexing_table import TURN, IndexingTable
 from moire.client.job import Job
 from moire.client.settings import Settings
 from moire.made.bus_tables import CAUSES, FAULTS
-from tb.bench import seed
 from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, poll, turn_to
-from tb.system.station_node import AXIS, NODE
-from twin import Devices, Twin, TwinTransport, build
+from tb.system.station_node import station_bus, station_twin
+from twin import Devices, TwinTransport
 from twin.nodes.twin import Axis, Node
 
 RECIPE = Path(__file__).resolve().parents[2] / "docs" / "indexing.md"
@@ -37,19 +35,9 @@ QUICK = {
 class Station:
     def __init__(self):
         table = Axis("worm_table", {"sensor_dropped": 0.005, "sensor_corrupt": 0.005})
-        self.twin = Twin(
-            [Node(1, [table], Devices(eeprom=True)), Node(2, [])],
-            seed=seed() % 1000,
-            node_parameters=NODE,
-            firmware=build.firmware("station"),
-            peers=(SUB, MAIN),
-            peer_baud=115200,
-        )
-        bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed()), poll_s=0.1)
-        bus.transport.wait(0.1)
-        node, axis = bus.node(1), bus.axis(1)
-        for name, value in AXIS.items():
-            axis.set_parameter(name, value)
+        nodes = [Node(1, [table], Devices(eeprom=True)), Node(2, [])]
+        self.twin = station_twin(nodes, peers=(SUB, MAIN))
+        node = station_bus(self.twin, 1).node(1)
         self.settings, self.table, self.job = Settings(node), IndexingTable(node), Job(node)
         self.settings.load(QUICK)
         self.to_sub, self.from_sub = (
@@ -143,7 +131,7 @@ def test_the_bytes_as_printed_turn_the_table_to_its_next_station(station):
     )
 
 
-class Kept(TwinTransport):
+class LeftOpen(TwinTransport):
     """A transport that stays open when a call of the command line ends, so that the machine goes
     on.
     """
@@ -157,21 +145,15 @@ def test_the_recipe_of_indexing_md_turns_the_table_as_it_is_printed():
     target = 3600 * 12.5
     assert len(commands) == 3 and commands[-1].endswith("turn to 12.5deg")
     nodes = [Node(1, []), Node(2, [Axis("worm_table")], Devices(eeprom=True))]
-    with Twin(
-        nodes,
-        seed=seed() % 1000,
-        node_parameters=NODE,
-        firmware=build.firmware("station"),
-        clk_hz=1_840_000,
-    ) as twin:
+    with station_twin(nodes, clk_hz=1_840_000) as twin:
         twin.set_position(1, math.radians(12.3))  # near, so that the motion is short
         twin.run(0.1)
         before = twin.truth(1)
         for command in commands:
             out, err = io.StringIO(), io.StringIO()
-            assert command_line.main(command.split(), lambda options: Kept(twin), out, err) == 0, (
-                err.getvalue()
-            )
+            assert (
+                command_line.main(command.split(), lambda options: LeftOpen(twin), out, err) == 0
+            ), err.getvalue()
         truth = twin.truth(1)
         assert truth.steps - before.steps > 3000 and truth.lost_steps == 0
         assert abs(math.degrees(truth.position_rad) * 3600 - target) <= 2

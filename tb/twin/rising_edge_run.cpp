@@ -13,9 +13,18 @@
 #include "verilated_node.h"  // made by twin/build.py
 #include "signals.h"         // made by test_rising_edge.py: INPUTS(X), REGISTERS(X), MEMORIES(X)
 
-constexpr unsigned QUIET = 64;          // an input keeps its level for so many cycles on average
+// An input keeps its level for so many cycles on average: in the first half of the cycles, and in
+// the second, in which the soft core waits and the other part of the node rests.
+constexpr unsigned LIVELY = 64, QUIET = 65536;
 constexpr uint64_t RESET_CYCLES = 16;   // at the beginning
 constexpr uint64_t MEMORY_CYCLES = 97;  // from one look at the memories to the next
+
+static void cycle(Vnode& node) {
+    node.clk = 1;
+    node.eval();
+    node.clk = 0;
+    node.eval();
+}
 
 int main(int count, char** arguments) {
     if (count != 4) return 2;
@@ -24,6 +33,7 @@ int main(int count, char** arguments) {
     std::mt19937_64 random(std::strtoull(arguments[3], nullptr, 0));
     VerilatedContext context;
     Vnode theirs(&context), ours(&context);
+    Rest rest;
     auto &a = *theirs.rootp, &b = *ours.rootp;
     a.rst = b.rst = 1;
     theirs.eval();
@@ -31,17 +41,18 @@ int main(int count, char** arguments) {
     std::string word;
     for (int n = 0; firmware >> word; n++)
         a.NODE_MEMORY[n] = b.NODE_MEMORY[n] = uint32_t(std::stoul(word, nullptr, 16));
-    uint64_t driving = 0;
+    uint64_t driving = 0, rested = 0;
     for (uint64_t n = 0; n < cycles; n++) {
-#define SET(name, mask) \
-    if (random() % QUIET == 0) a.name = b.name = uint64_t(random()) & mask;
+#define SET(name, mask)                                    \
+    if (random() % (n < cycles / 2 ? LIVELY : QUIET) == 0) \
+        a.name = b.name = uint64_t(random()) & mask;
         INPUTS(SET)
         a.rst = b.rst = n < RESET_CYCLES;
-        a.clk = 1;
-        theirs.eval();
-        a.clk = 0;
-        theirs.eval();
-        rising_edge(b);
+        cycle(theirs);
+        if (b.rst)
+            cycle(ours);
+        else
+            rising_edge(b, rest);
 #define COMPARE(name)                                                          \
     if (std::memcmp(&a.name, &b.name, sizeof a.name)) {                        \
         std::printf("cycle %llu: " #name " differs\n", (unsigned long long)n); \
@@ -52,7 +63,9 @@ int main(int count, char** arguments) {
             MEMORIES(COMPARE)
         }
         driving += a.rs485_driver_enable;
+        rested += rest.known;
     }
-    std::printf("the same for %llu cycles; the node drove the bus in %llu of them\n",
-                (unsigned long long)cycles, (unsigned long long)driving);
+    std::printf("the same for %llu cycles; the node drove the bus in %llu, and rested in %llu\n",
+                (unsigned long long)cycles, (unsigned long long)driving,
+                (unsigned long long)rested);
 }

@@ -24,9 +24,10 @@ LEAD = 1e-3 / (2 * math.pi)  # m/rad
 def test_every_parameter_has_a_unit_and_a_reason():
     for machine in parameters.MACHINES:
         for name, entry in parameters.load(machine).items():
-            assert (
-                set(entry) == {"value", "unit", "why"} and entry["unit"] and len(entry["why"]) >= 2
-            ), (machine, name)
+            assert {"value", "unit", "why"} <= set(entry), (machine, name)
+            assert set(entry) <= {"value", "unit", "why", "typical", "bad"}, (machine, name)
+            assert "bad" in entry or "typical" not in entry, (machine, name)
+            assert entry["unit"] and len(entry["why"]) >= 2, (machine, name)
     with pytest.raises(KeyError, match="no parameter screw_pitch"):
         Stage(screw_pitch=1)
 

@@ -21,6 +21,10 @@
 #define FINE_MS 10u        // the axis must be within the reach for this time
 #define EASE 8             // decrease of the motor command per millisecond in the fine stage
 
+// Longest time between two polls: nothing happens without a request
+#define OFF_TICKS 64u     // while the drive is off
+#define HOLDING_TICKS 1u  // at standstill: only a fault, which has switched the drive off already
+
 enum drive { BRIDGE, STEPS, DAC_OUTPUT };
 
 static struct axis {
@@ -147,6 +151,13 @@ void axis_poll(unsigned n) {
         break;
     default: break;
     }
+}
+
+uint32_t axis_idle_ticks(unsigned n) {
+    const struct axis* a = &axes[n];
+    if (a->state == BUS_STATE_OFF || a->state == BUS_STATE_FAULTED) return OFF_TICKS;
+    bool rests = a->state == BUS_STATE_HOLDING && !a->leaving && !a->fine;
+    return rests && !parameters_get(n, BUS_PARAMETER_FINE_REACH) ? HOLDING_TICKS : 0;
 }
 
 void axis_start(unsigned n) {

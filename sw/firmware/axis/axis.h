@@ -12,6 +12,9 @@
 void axis_start(unsigned n);  // drive off, all parameters at their defaults
 void axis_poll(unsigned n);   // one step of the state machine; to be called often
 
+// The longest time to the next axis_poll, in ticks; 0: at once.
+uint32_t axis_idle_ticks(unsigned n);
+
 // Switches the drive on or off. Returns faulted if a fault is latched or latches at once.
 uint8_t axis_enable(unsigned n, bool on);
 

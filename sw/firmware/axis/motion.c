@@ -3,7 +3,7 @@
 //
 // What is in the queue of the player cannot be taken back when the target changes. So the queue is
 // filled only as far as needed: for QUEUED_MS, plus the longest time between two calls of
-// motion_feed. What counts is the duration of the queued pieces, since pieces may be short.
+// motion_feed. Its fill is measured by the duration of the pieces, since pieces may be short.
 #include "axis/motion.h"
 
 #include "core/clock.h"

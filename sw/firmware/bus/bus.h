@@ -4,10 +4,12 @@
 #ifndef MOIRE_BUS_H
 #define MOIRE_BUS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 void bus_start(unsigned axes);
 void bus_poll(void);  // handles a few received bytes; to be called often
+bool bus_idle(void);  // whether there is nothing to do before a word is received
 
 // Executes a request body that did not come over the bus. Returns the length of the reply body, at
 // most BUS_LONGEST_BODY.

@@ -124,9 +124,13 @@ static void excite(unsigned n) {
                (uint32_t)(up ? scope.setting.amplitude : -scope.setting.amplitude));
 }
 
+bool scope_idle(void) {
+    return scope.state != BUS_SCOPE_STATE_WAITING && scope.state != BUS_SCOPE_STATE_RECORDING;
+}
+
 void scope_work(void) {
     unsigned n = scope.setting.axis;
-    if (scope.state != BUS_SCOPE_STATE_WAITING && scope.state != BUS_SCOPE_STATE_RECORDING) return;
+    if (scope_idle()) return;
     uint32_t now = node_read(NODE_TIME_STAMP_LOW);
     if ((int32_t)(now - scope.due) < 0) return;
     scope.due += scope.every;

@@ -6,12 +6,14 @@
 #ifndef MOIRE_SCOPE_H
 #define MOIRE_SCOPE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #define SCOPE_CYCLES 64u
 
 void scope_start(unsigned axes);
 void scope_work(void);
+bool scope_idle(void);
 uint8_t scope_operation(uint8_t operation);  // a bus_cause
 
 #endif

@@ -73,10 +73,18 @@ void segments_start(unsigned served_axes) {
     }
 }
 
+static bool unused(unsigned n) { return required_use(n) == OFF && tables[n].use == OFF; }
+
+bool segments_idle(void) {
+    for (unsigned n = 0; n < axes; n++)
+        if (!unused(n) && required_use(n) != in_force(n)) return false;
+    return true;
+}
+
 // Between two different uses the table is off for one turn.
 void segments_work(void) {
     turn = turn + 1 < axes ? turn + 1 : 0;
-    if (required_use(turn) == OFF && tables[turn].use == OFF) return;  // the usual case
+    if (unused(turn)) return;  // the usual case
     if (axis_ended(turn) == BUS_CAUSE_RUNNING) return;
     uint8_t now = in_force(turn), use = axis_homed(turn) ? required_use(turn) : OFF;
     if (now == use) return;

@@ -4,10 +4,12 @@
 #ifndef MOIRE_SEGMENTS_H
 #define MOIRE_SEGMENTS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 void segments_start(unsigned axes);
 void segments_work(void);
+bool segments_idle(void);
 uint8_t segments_operation(uint8_t operation);  // a bus_cause
 
 #endif

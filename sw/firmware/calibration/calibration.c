@@ -4,7 +4,9 @@
 //
 // This is the order of the work; ellipse, spectrum and harmonics do it. Two bursts of samples give
 // the ellipse. From then on passes of CALIBRATION_PASS bursts of phases give the harmonics, and
-// each pass that is accepted corrects the values in force.
+// each pass that is accepted corrects the values in force. Once calibrated it can follow the drift
+// of the signal: further ellipses are compared with the first one after the calibration, so that
+// what the harmonics do to an ellipse does not matter, and their changes are added to the values.
 #include "calibration/calibration.h"
 
 #include "calibration/calibration_burst.h"
@@ -15,11 +17,13 @@
 #include "calibration/waves.h"
 #include "made/bus_protocol.h"
 
-#define SCATTER_LIMIT 64   // 4 LSB of a 16-bit phase
-#define FEWEST_SPECTRA 3u  // that show which line stays
+#define SCATTER_LIMIT 64      // 4 LSB of a 16-bit phase
+#define LIMITS_OF_LONGEST 3u  // of them are accepted from a pass that cannot become longer
+#define FEWEST_SPECTRA 3u     // that show which line stays
 
 enum stage {
     UPDATE,
+    LAST_UPDATE,
     TABLE,
     FIRST_READING,
     FIT,
@@ -43,6 +47,15 @@ static void begin_stage(enum stage stage) {
     burst.next = 0;
 }
 
+static bool collects_phases(const struct calibration* calibration) {
+    return calibration->harmonics && calibration->mode != CALIBRATION_FOLLOWS;
+}
+
+static uint8_t reason_of_mode(const struct calibration* calibration) {
+    return calibration->mode == CALIBRATION_FROZEN ? BUS_CALIBRATION_REASON_FROZEN
+                                                   : BUS_CALIBRATION_REASON_CALIBRATING;
+}
+
 static void reject(struct calibration* calibration, enum bus_calibration_reason reason) {
     calibration->reason = (uint8_t)reason;
     calibration->refused++;
@@ -61,17 +74,18 @@ void calibration_forget(struct calibration* calibration) {
     calibration->values = calibration_identity;
     calibration->harmonics = false;
     calibration->complete = false;
+    calibration->referenced = false;
     release_burst(calibration);
     ellipse_start(&calibration->ellipse);
-    calibration->reason =
-        calibration->frozen ? BUS_CALIBRATION_REASON_FROZEN : BUS_CALIBRATION_REASON_CALIBRATING;
+    calibration->reason = reason_of_mode(calibration);
     calibration->need = CALIBRATION_NEEDS_LOADING;
 }
 
 void calibration_start(struct calibration* calibration) {
     release_burst(calibration);
-    *calibration =
-        (struct calibration){.amplitude_high = UINT16_MAX, .scatter_limit = SCATTER_LIMIT};
+    *calibration = (struct calibration){.amplitude_high = UINT16_MAX,
+                                        .scatter_limit = SCATTER_LIMIT,
+                                        .mode = CALIBRATION_CALIBRATES};
     calibration_forget(calibration);
 }
 
@@ -81,8 +95,8 @@ bool calibration_restore(struct calibration* calibration, const struct calibrati
     calibration->values = *values;
     calibration->harmonics = true;
     calibration->complete = true;
-    calibration->reason =
-        calibration->frozen ? BUS_CALIBRATION_REASON_FROZEN : BUS_CALIBRATION_REASON_CALIBRATING;
+    calibration->referenced = false;
+    calibration->reason = reason_of_mode(calibration);
     calibration->need = CALIBRATION_NEEDS_LOADING;
     return true;
 }
@@ -90,9 +104,9 @@ bool calibration_restore(struct calibration* calibration, const struct calibrati
 // Begins what follows once the values are in force.
 static void begin_next(struct calibration* calibration) {
     release_burst(calibration);
-    if (calibration->frozen) {
+    if (calibration->mode == CALIBRATION_FROZEN) {
         calibration->need = CALIBRATION_NEEDS_NOTHING;
-    } else if (calibration->harmonics) {
+    } else if (collects_phases(calibration)) {
         begin_pass(calibration);
     } else {
         ellipse_start(&calibration->ellipse);
@@ -100,10 +114,9 @@ static void begin_next(struct calibration* calibration) {
     }
 }
 
-void calibration_freeze(struct calibration* calibration, bool frozen) {
-    calibration->frozen = frozen;
-    calibration->reason =
-        frozen ? BUS_CALIBRATION_REASON_FROZEN : BUS_CALIBRATION_REASON_CALIBRATING;
+void calibration_set_mode(struct calibration* calibration, enum calibration_mode mode) {
+    calibration->mode = (uint8_t)mode;
+    calibration->reason = reason_of_mode(calibration);
     // Values that are not in the hardware yet are loaded even so.
     if (calibration->need != CALIBRATION_NEEDS_LOADING) begin_next(calibration);
 }
@@ -119,6 +132,7 @@ static void end_burst(struct calibration* calibration, enum calibration_need nee
 
 static void accept(struct calibration* calibration) {
     calibration->reason = BUS_CALIBRATION_REASON_CALIBRATING;
+    if (calibration->mode == CALIBRATION_CALIBRATES) calibration->referenced = false;
     calibration->accepted++;
     end_burst(calibration, CALIBRATION_NEEDS_LOADING);
 }
@@ -127,9 +141,9 @@ static void accept(struct calibration* calibration) {
 // burst of phases is refused alone.
 static void refuse_burst(struct calibration* calibration, enum bus_calibration_reason reason) {
     reject(calibration, reason);
-    if (!calibration->harmonics) ellipse_start(&calibration->ellipse);
+    if (!collects_phases(calibration)) ellipse_start(&calibration->ellipse);
     end_burst(calibration,
-              calibration->harmonics ? CALIBRATION_NEEDS_PHASES : CALIBRATION_NEEDS_SAMPLES);
+              collects_phases(calibration) ? CALIBRATION_NEEDS_PHASES : CALIBRATION_NEEDS_SAMPLES);
 }
 
 bool calibration_open(struct calibration* calibration, uint16_t every, bool spoiled) {
@@ -147,7 +161,7 @@ bool calibration_open(struct calibration* calibration, uint16_t every, bool spoi
         refuse_burst(calibration, BUS_CALIBRATION_REASON_AMPLITUDE);
     else
         calibration->need =
-            calibration->harmonics ? CALIBRATION_NEEDS_WORK : CALIBRATION_NEEDS_WORDS;
+            collects_phases(calibration) ? CALIBRATION_NEEDS_WORK : CALIBRATION_NEEDS_WORDS;
     return true;
 }
 
@@ -181,7 +195,7 @@ static void end_of_second_reading(struct calibration* calibration) {
 
 void calibration_take(struct calibration* calibration, const uint32_t words[CALIBRATION_WORDS]) {
     if (calibration->need != CALIBRATION_NEEDS_WORDS) return;
-    if (!calibration->harmonics) {
+    if (!collects_phases(calibration)) {
         ellipse_take(&calibration->ellipse, calibration, words[0]);
         if (++burst.taken == CALIBRATION_BURST) end_of_samples(calibration);
     } else if (burst.stage == SECOND_READING) {
@@ -193,7 +207,45 @@ void calibration_take(struct calibration* calibration, const uint32_t words[CALI
     }
 }
 
+// A change of the quadrature error turns the sine alone, so the phase turns with the cosine. Which
+// of both has drifted cannot be known: half of the turn is taken back.
+static int32_t half_turn(int32_t quadrature_error) {  // 2^-16 rad; the result in 2^-24 period
+    return (int32_t)(((int64_t)quadrature_error * 20861 + 512) >> 10);  // 2^8 / 4 pi
+}
+
+// The first ellipse since the values came into force is what later ones are compared with.
+static void follow(struct calibration* calibration) {
+    struct calibration_values* values = &calibration->values;
+    struct calibration_values found = *values;
+    enum bus_calibration_reason reason = ellipse_values(burst.fit.solution, &found);
+    if (reason == BUS_CALIBRATION_REASON_CALIBRATING && calibration->referenced) {
+        found.sin_offset = (int16_t)(found.sin_offset + calibration->beside[0]);
+        found.cos_offset = (int16_t)(found.cos_offset + calibration->beside[1]);
+        found.gain += calibration->beside[2];
+        found.quadrature_error += calibration->beside[3];
+        found.shift += half_turn(found.quadrature_error - values->quadrature_error);
+        if (!calibration_values_fit(&found)) reason = BUS_CALIBRATION_REASON_DISTORTED;
+    }
+    if (reason != BUS_CALIBRATION_REASON_CALIBRATING) {
+        refuse_burst(calibration, reason);
+    } else if (calibration->referenced) {
+        *values = found;
+        accept(calibration);
+    } else {
+        calibration->beside[0] = values->sin_offset - found.sin_offset;
+        calibration->beside[1] = values->cos_offset - found.cos_offset;
+        calibration->beside[2] = values->gain - found.gain;
+        calibration->beside[3] = values->quadrature_error - found.quadrature_error;
+        calibration->referenced = true;
+        begin_next(calibration);
+    }
+}
+
 static void end_of_ellipse(struct calibration* calibration) {
+    if (calibration->mode == CALIBRATION_FOLLOWS) {
+        follow(calibration);
+        return;
+    }
     enum bus_calibration_reason reason = ellipse_values(burst.fit.solution, &calibration->values);
     if (reason == BUS_CALIBRATION_REASON_CALIBRATING) {
         calibration->harmonics = true;
@@ -230,18 +282,21 @@ static void end_of_projection(struct calibration* calibration) {
         calibration->reason = BUS_CALIBRATION_REASON_CALIBRATING;
     if (pass->bursts == 0 || gone < pass->slowest) pass->slowest = gone;
     if (pass->bursts == 0 || gone > pass->fastest) pass->fastest = gone;
-    begin_stage(UPDATE);
-    if (++pass->bursts < CALIBRATION_PASS) end_burst(calibration, CALIBRATION_NEEDS_PHASES);
+    if (++pass->bursts % CALIBRATION_PASS)
+        end_burst(calibration, CALIBRATION_NEEDS_PHASES);
+    else
+        begin_stage(LAST_UPDATE);
 }
 
 static void end_of_pass(struct calibration* calibration) {
     const struct calibration_pass* pass = &calibration->pass;
     enum bus_calibration_reason reason = BUS_CALIBRATION_REASON_CALIBRATING;
-    bool even;
+    bool even, longest = pass->bursts >= CALIBRATION_LONGEST_PASS;
+    uint32_t limit = (longest ? LIMITS_OF_LONGEST : 1u) * calibration->scatter_limit;
     calibration->scatter = harmonics_scatter(pass, &even);
     if ((uint64_t)pass->fastest * 8 < (uint64_t)pass->slowest * 9)
         reason = BUS_CALIBRATION_REASON_ONE_SPEED;
-    else if (!even || calibration->scatter > calibration->scatter_limit)
+    else if (!even || calibration->scatter > limit)
         reason = BUS_CALIBRATION_REASON_VIBRATION;
     else if (!calibration_values_fit(&burst.candidate))
         reason = BUS_CALIBRATION_REASON_DISTORTED;
@@ -249,6 +304,10 @@ static void end_of_pass(struct calibration* calibration) {
         calibration->values = burst.candidate;
         calibration->complete = true;
         accept(calibration);
+    } else if (reason == BUS_CALIBRATION_REASON_VIBRATION && !longest) {
+        // Further bursts average the vibration out.
+        calibration->reason = (uint8_t)reason;
+        end_burst(calibration, CALIBRATION_NEEDS_PHASES);
     } else {
         reject(calibration, reason);
         release_burst(calibration);
@@ -265,7 +324,9 @@ void calibration_work(struct calibration* calibration) {
     case UPDATE:
         if (!harmonics_update_candidate(pass, next)) break;
         begin_stage(TABLE);
-        if (pass->bursts == CALIBRATION_PASS) end_of_pass(calibration);
+        break;
+    case LAST_UPDATE:
+        if (harmonics_update_candidate(pass, next)) end_of_pass(calibration);
         break;
     case TABLE:
         if (harmonics_fill_table(next)) begin_burst(calibration);

@@ -2,7 +2,7 @@
 // calibration -- offset, gain, quadrature error and harmonics of a sine/cosine signal, determined
 // in motion and without a reference (docs/interpolation.md). No hardware.
 //
-// Whoever serves it looks at `need` and does this, a few words or one piece of work a poll:
+// The caller polls `need` and does this, a few words or one piece of work a poll:
 //   CALIBRATION_NEEDS_SAMPLES, _PHASES  let calibration_recorder fill, then call calibration_open
 //   CALIBRATION_NEEDS_WORDS             calibration_take for each sample of the burst, or for each
 //                                       four words of phases; a burst of phases is read twice
@@ -22,15 +22,15 @@
 void calibration_start(struct calibration* calibration);  // from reset: nothing is known
 
 // The values become calibration_identity and everything is determined from scratch; window, limit,
-// counters and the freeze stay.
+// counters and the mode do not change.
 void calibration_forget(struct calibration* calibration);
 
 // Puts values into force as if they had been determined. Returns false and changes nothing if one
 // is out of range.
 bool calibration_restore(struct calibration* calibration, const struct calibration_values* values);
 
-// A frozen calibration determines nothing; its values stay in force.
-void calibration_freeze(struct calibration* calibration, bool frozen);
+// A frozen calibration determines nothing; its values stay in force. What was under way ends.
+void calibration_set_mode(struct calibration* calibration, enum calibration_mode mode);
 
 // A burst was recorded, one sample of `every`; it is spoiled if its amplitude left the window.
 // Returns false if no burst is needed, or another calibration works on one: then call again.

@@ -26,13 +26,19 @@ void calibration_axes_work(void) {
     calibration_driver_poll(served);
 }
 
+bool calibration_axes_idle(void) {
+    for (unsigned n = 0; n < axes; n++)
+        if (!calibration_driver_idle(n)) return false;
+    return true;
+}
+
 static uint8_t calibration(unsigned axis) {
     const struct calibration* calibration = calibration_driver_state(axis);
     uint8_t cause =
         calibration_driver_do(axis, (uint8_t)bus_request_field(BUS_CALIBRATION_REQUEST_ACTION, 1));
     bus_reply_field(BUS_CALIBRATION_REPLY_REASON, calibration_driver_reason(axis), 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_CONVERGED, calibration->complete, 1);
-    bus_reply_field(BUS_CALIBRATION_REPLY_FROZEN, calibration->frozen, 1);
+    bus_reply_field(BUS_CALIBRATION_REPLY_FROZEN, calibration->mode == CALIBRATION_FROZEN, 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_ACCEPTED, calibration->accepted, 4);
     bus_reply_field(BUS_CALIBRATION_REPLY_REFUSED, calibration->refused, 4);
     bus_reply_field(BUS_CALIBRATION_REPLY_SCATTER, calibration->scatter, 4);

@@ -4,10 +4,12 @@
 #ifndef MOIRE_CALIBRATION_AXES_H
 #define MOIRE_CALIBRATION_AXES_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 void calibration_axes_start(unsigned axes);
 void calibration_axes_work(void);
+bool calibration_axes_idle(void);
 uint8_t calibration_axes_operation(uint8_t operation);  // returns a bus_cause
 
 #endif

@@ -3,9 +3,9 @@
 // calibration_recorder, values go into signal_correction and harmonic_correction.
 //
 // A burst is begun while the axis moves fast enough to cover CALIBRATION_PERIODS within LONGEST_MS,
-// and begun again when the speed has changed by a factor of two since. It is read a few words a
-// poll, and worked on a few pieces a poll, for at most about WORK_MS. New values are written beside
-// those in force, and one strobe exchanges both the correction and the table.
+// and begun again at twice the speed; one of phases also at half the speed. It is read
+// a few words a poll, and worked on a few pieces a poll, for at most about WORK_MS. New values are
+// written beside those in force, and one strobe exchanges both the correction and the table.
 #include "calibration/calibration_driver.h"
 
 #include "axis/axis.h"
@@ -33,7 +33,7 @@ struct calibration_driver {
 static struct calibration_driver drivers[HARDWARE_AXES];
 static uint32_t work_cycles;
 
-// Ends whatever was under way for the calibration.
+// Ends the burst or the loading that was under way for the calibration.
 static void restart(struct calibration_driver* driver) {
     driver->recording = false;
     driver->point = 0;
@@ -54,6 +54,13 @@ static uint32_t every_now(unsigned n, bool phases) {
 // Within 2/3 … 2 of what is required: enough periods, and enough samples of each.
 static bool near(uint32_t every, uint32_t required) {
     return 3u * every >= 2u * required && every <= 2u * required;
+}
+
+// It is better to begin a burst again at the present speed: at twice the speed it ends sooner, and
+// phases must be from one speed. Samples may be from any.
+static bool outdated(const struct calibration_driver* driver, uint32_t every) {
+    return every == 0 || 2u * every < driver->every ||
+           (driver->phases && every > 2u * driver->every);
 }
 
 static void record(unsigned n) {
@@ -88,7 +95,7 @@ static void burst_poll(unsigned n) {
     if (state & FEEDBACK_RECORDER_STATE_FULL_MASK)
         driver->recording = !calibration_open(&driver->calibration, driver->every,
                                               state & FEEDBACK_RECORDER_STATE_INVALID_MASK);
-    else if (every == 0 || every > 2u * driver->every || 2u * every < driver->every)
+    else if (outdated(driver, every))
         record(n);
 }
 
@@ -150,11 +157,18 @@ void calibration_driver_start(unsigned n) {
     feedback_clear_signal_faults(n);
 }
 
+// A burst is needed, but the axis is too slow.
+static bool at_standstill(const struct calibration_driver* driver) {
+    bool waiting = driver->calibration.need == CALIBRATION_NEEDS_SAMPLES ||
+                   driver->calibration.need == CALIBRATION_NEEDS_PHASES;
+    return waiting && !driver->moving && !driver->recording;
+}
+
 static void follow_parameter(unsigned n) {
     struct calibration_driver* driver = &drivers[n];
-    bool frozen = parameters_get(n, BUS_PARAMETER_AUTO_CALIBRATION) == 0;
-    if (driver->calibration.frozen == frozen) return;
-    calibration_freeze(&driver->calibration, frozen);
+    uint8_t mode = (uint8_t)parameters_get(n, BUS_PARAMETER_AUTO_CALIBRATION);
+    if (driver->calibration.mode == mode) return;
+    calibration_set_mode(&driver->calibration, mode);
     driver->recording = false;
     driver->moving = true;  // until the speed is read
 }
@@ -172,30 +186,39 @@ void calibration_driver_poll(unsigned n) {
     }
 }
 
+bool calibration_driver_idle(unsigned n) {
+    return drivers[n].calibration.need == CALIBRATION_NEEDS_NOTHING || at_standstill(&drivers[n]);
+}
+
 const struct calibration* calibration_driver_state(unsigned n) { return &drivers[n].calibration; }
 
 uint8_t calibration_driver_reason(unsigned n) {
     const struct calibration_driver* driver = &drivers[n];
-    bool waiting = driver->calibration.need == CALIBRATION_NEEDS_SAMPLES ||
-                   driver->calibration.need == CALIBRATION_NEEDS_PHASES;
-    if (waiting && !driver->moving && !driver->recording &&
-        driver->calibration.reason < BUS_CALIBRATION_REASON_ONE_SPEED)
+    if (at_standstill(driver) && driver->calibration.reason < BUS_CALIBRATION_REASON_ONE_SPEED)
         return BUS_CALIBRATION_REASON_STANDSTILL;
     return driver->calibration.reason;
 }
 
+static void set_mode(unsigned n, enum calibration_mode mode) {
+    parameters_set(n, BUS_PARAMETER_AUTO_CALIBRATION, mode);
+    follow_parameter(n);
+}
+
 uint8_t calibration_driver_do(unsigned n, uint8_t action) {
     struct calibration_driver* driver = &drivers[n];
-    if (action > BUS_CALIBRATION_ACTION_CLEAR) return BUS_CAUSE_OUT_OF_RANGE;
-    if (action == BUS_CALIBRATION_ACTION_CALIBRATE || action == BUS_CALIBRATION_ACTION_FREEZE)
-        parameters_set(n, BUS_PARAMETER_AUTO_CALIBRATION,
-                       action == BUS_CALIBRATION_ACTION_CALIBRATE);
-    follow_parameter(n);
-    if (action == BUS_CALIBRATION_ACTION_CLEAR) {
+    uint8_t cause = BUS_CAUSE_OK;
+    switch (action) {
+    case BUS_CALIBRATION_ACTION_READ: break;
+    case BUS_CALIBRATION_ACTION_CALIBRATE: set_mode(n, CALIBRATION_CALIBRATES); break;
+    case BUS_CALIBRATION_ACTION_FREEZE: set_mode(n, CALIBRATION_FROZEN); break;
+    case BUS_CALIBRATION_ACTION_FOLLOW: set_mode(n, CALIBRATION_FOLLOWS); break;
+    case BUS_CALIBRATION_ACTION_CLEAR:
         calibration_forget(&driver->calibration);
         restart(driver);
+        break;
+    default: cause = BUS_CAUSE_OUT_OF_RANGE;
     }
-    return BUS_CAUSE_OK;
+    return cause;
 }
 
 uint8_t calibration_driver_set_harmonic(unsigned n, uint8_t order, int32_t cosine, int32_t sine) {

@@ -2,8 +2,8 @@
 // calibration_driver -- connects the calibration of each axis to its registers: bursts come from
 // calibration_recorder, values go into signal_correction and harmonic_correction.
 //
-// The parameter `auto_calibration` says whether an axis calibrates itself; when it does not, the
-// values that were determined stay in force.
+// The parameter `auto_calibration` says whether an axis calibrates itself or follows the drift of
+// its signal; when it does neither, the values that were determined stay in force.
 #ifndef MOIRE_CALIBRATION_DRIVER_H
 #define MOIRE_CALIBRATION_DRIVER_H
 
@@ -17,6 +17,8 @@ void calibration_driver_start(unsigned n);
 
 // One small piece of work, about 1 ms at most.
 void calibration_driver_poll(unsigned n);
+// Whether there is nothing to do but to see that the axis moves.
+bool calibration_driver_idle(unsigned n);
 
 const struct calibration* calibration_driver_state(unsigned n);
 uint8_t calibration_driver_reason(unsigned n);  // a bus_calibration_reason

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // calibration_types -- the state of the calibration of one sine/cosine signal: what is in force,
-// what it needs next, and the sums of what it has seen.
+// what it needs next, and the sums of its samples and phases.
 #ifndef MOIRE_CALIBRATION_TYPES_H
 #define MOIRE_CALIBRATION_TYPES_H
 
@@ -14,9 +14,10 @@
 #define CALIBRATION_WORDS 4u      // words of phases that are taken at once
 #define CALIBRATION_PHASES 2048u  // phases in a burst
 #define CALIBRATION_ELLIPSE_BURSTS 2u
-#define CALIBRATION_PASS 39u     // bursts of phases in a pass
-#define CALIBRATION_LINES 128u   // of the spectrum of a burst: 0 … 127 cycles in it
-#define CALIBRATION_PERIODS 15u  // that a burst should cover; it must cover 8
+#define CALIBRATION_PASS 39u           // bursts of phases in a pass
+#define CALIBRATION_LONGEST_PASS 312u  // of one that a vibration makes longer
+#define CALIBRATION_LINES 128u         // of the spectrum of a burst: 0 … 127 cycles in it
+#define CALIBRATION_PERIODS 15u        // that a burst should cover; it must cover 8
 
 enum calibration_need {
     CALIBRATION_NEEDS_NOTHING,  // it is frozen
@@ -26,6 +27,12 @@ enum calibration_need {
     CALIBRATION_NEEDS_WORDS,    // the burst that was opened, from its first word to its last
     CALIBRATION_NEEDS_WORK,     // calibration_work
     CALIBRATION_NEEDS_LOADING   // its values in the hardware
+};
+
+enum calibration_mode {      // as the parameter auto_calibration counts them
+    CALIBRATION_FROZEN,      // the values stay
+    CALIBRATION_CALIBRATES,  // determines everything
+    CALIBRATION_FOLLOWS      // adds what the ellipse has changed since to the values
 };
 
 // Sums over samples. x = cos and y = sin in 13 bits, so that the sums of 4096 samples fit.
@@ -43,12 +50,12 @@ struct calibration_ellipse {
 struct calibration_pass {
     uint32_t slowest, fastest;  // |travel| of a burst, 2^-16 period
     uint16_t every;             // decimation of the recorder for which `line` holds
-    uint8_t bursts;
+    uint16_t bursts;
     uint8_t spectra;                          // that `line` covers
     uint8_t line[CALIBRATION_LINES];          // weakest power of the line in any burst, 4 log2
     int32_t information[CALIBRATION_ORDERS];  // weight of the bursts for an order, 2^-15 burst
-    int32_t cosine[CALIBRATION_ORDERS];  // weighted sum of the results of the bursts, 2^-27 period
-    int32_t sine[CALIBRATION_ORDERS];
+    int64_t cosine[CALIBRATION_ORDERS];  // weighted sum of the results of the bursts, 2^-27 period
+    int64_t sine[CALIBRATION_ORDERS];
     int64_t squares;  // of the weighted changes that the bursts made, all orders, 2^-48 period^2
 };
 
@@ -59,9 +66,13 @@ struct calibration {
     uint16_t scatter_limit;  // largest standard error that is accepted, 2^-20 period
     uint8_t reason;          // a bus_calibration_reason: of the last burst or pass
     uint8_t need;            // a calibration_need
-    bool frozen;
-    bool harmonics;     // the ellipse is known: bursts of phases are next
-    bool complete;      // a pass has been accepted since the last reset
+    uint8_t mode;            // a calibration_mode
+    bool harmonics;          // the ellipse is known: bursts of phases are next, unless it follows
+    bool complete;           // a pass has been accepted since the last reset
+    bool referenced;         // `beside` is known
+    // The values in force less those of an ellipse of the same time: offsets of sine and cosine,
+    // gain, quadrature error. An ellipse takes some of the harmonics for its own.
+    int32_t beside[4];
     uint32_t refused;   // bursts and passes, since start
     uint32_t accepted;  // ellipses and passes, since start
     uint32_t scatter;   // standard error of the last pass, 2^-20 period

@@ -12,7 +12,7 @@
 #define CALIBRATION_ORDERS 10u
 
 // sin' = gain (sin - sin_offset) + quadrature_error (cos - cos_offset), then
-// phase' = phase - sum over k of cosine[k-1] cos(k phase) + sine[k-1] sin(k phase)
+// phase' = phase - shift - sum over k of cosine[k-1] cos(k phase) + sine[k-1] sin(k phase)
 struct calibration_values {
     int16_t sin_offset;                  // 2^-15 of full scale, +-16384 at most
     int16_t cos_offset;                  // the same
@@ -20,6 +20,7 @@ struct calibration_values {
     int32_t quadrature_error;            // 2^-16, +-1 at most
     int32_t cosine[CALIBRATION_ORDERS];  // 2^-24 period, +-1/8 period at most
     int32_t sine[CALIBRATION_ORDERS];    // the same
+    int32_t shift;                       // 2^-24 period: half of the phase error that drifted
 };
 
 extern const struct calibration_values calibration_identity;  // corrects nothing

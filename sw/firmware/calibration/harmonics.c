@@ -2,13 +2,14 @@
 // harmonics -- the periodic error of a sine/cosine signal, from bursts of phases in motion.
 //
 // Position = phase - c(phase) is smooth motion, plus one vibration, plus noise, where c is the
-// periodic error. A burst is read twice. First: what the pass knows of c is subtracted, the means
+// periodic error. A burst is read twice. First, the present estimate of c is subtracted, the means
 // of 8 phases are fitted by position, speed and acceleration, and the spectrum of the residual
 // shows the vibration. Then motion and vibration, fitted together, are subtracted from every phase,
-// and the residual is projected on each order. What an order shares with the vibration is lost to
-// it; by so much the burst has less information about the order. A burst weighs as the inverse of
-// the power that is left in it. Sums over the circle use its four mirrored quarters. A burst costs
-// the core, which takes 4 cycles an instruction, 1.4 million cycles.
+// and the residual is projected on each order. An order and a vibration of nearly the same
+// frequency cannot be told apart, so the burst then has less information about that order. The
+// weight of a burst is the inverse of the power of its residual. Sums over the circle use its four
+// mirrored quarters. A burst costs the core, which takes 4 cycles an instruction, 1.4 million
+// cycles.
 #include "calibration/harmonics.h"
 
 #include "calibration/calibration_burst.h"
@@ -54,7 +55,7 @@ static int32_t entry_of(int64_t sum) { return clamp((sum + (1 << 18)) >> 19, LAR
 int32_t harmonics_table_entry(const struct calibration_values* values, uint32_t point) {
     int64_t sum[4];
     sums_at(values, point * (512 / CALIBRATION_POINTS), sum);
-    return entry_of(sum[0] + sum[1] + sum[2] + sum[3]);
+    return entry_of(sum[0] + sum[1] + sum[2] + sum[3] + (int64_t)values->shift * (1 << 15));
 }
 
 // Fills four bins, which mirror each other.
@@ -196,7 +197,8 @@ enum bus_calibration_reason harmonics_check_burst(void) {
                                                  : BUS_CALIBRATION_REASON_CALIBRATING;
 }
 
-// Of a wave in the mean of a block, 1.0 = 2^15; `half` is half of its step from phase to phase.
+// Attenuation of a wave in the mean of a block, 1.0 = 2^15; `half` is half of its step from phase
+// to phase.
 static int32_t attenuation(uint32_t half) {
     int32_t twice = cosine_of(half) * cosine_of(2 * half) >> 15;
     return twice * cosine_of(4 * half) >> 15;
@@ -263,7 +265,7 @@ void harmonics_weigh(void) {
     burst.order = 0;
 }
 
-// The four mirrored bins become what the cosines of even and odd orders see of them, then the
+// The four mirrored bins become their sums for the cosines of even and odd orders, then for the
 // sines.
 static void fold_bin(uint32_t n) {
     for (uint32_t i = 0; i < 3; i++) {
@@ -299,8 +301,8 @@ bool harmonics_project(uint32_t next) {
     return next == QUARTER / TOGETHER - 1;
 }
 
-// What the vibration takes of an order: its two sidebands, each as far as it shows in the mean of a
-// block. 1.0 = 2^15.
+// The part of an order that the vibration hides: its two sidebands, each as attenuated in the mean
+// of a block. 1.0 = 2^15.
 static int64_t lost_to_vibration(int32_t order) {
     int32_t step = (int32_t)(burst.vibration / CALIBRATION_PHASES),
             own = order * (burst.travel / (int32_t)(CALIBRATION_PHASES - 1));

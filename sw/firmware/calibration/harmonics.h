@@ -15,7 +15,7 @@
 // Entry 0 … CALIBRATION_POINTS - 1 of the table of harmonic_correction, 2^-20 period.
 int32_t harmonics_table_entry(const struct calibration_values* values, uint32_t point);
 
-// The candidate becomes what the pass has found so far, and the table of the burst follows it.
+// The candidate becomes the present result of the pass, and the table of the burst is made from it.
 bool harmonics_update_candidate(const struct calibration_pass* pass, uint32_t next);
 bool harmonics_fill_table(uint32_t next);
 
@@ -31,14 +31,14 @@ enum bus_calibration_reason harmonics_check_burst(void);
 // vibration. The caller solves it.
 void harmonics_begin_equations(uint32_t unknowns);
 
-// Puts what the motion leaves into the spectrum.
+// Puts the residual of the motion into the spectrum.
 bool harmonics_put_residuals(uint32_t next);
 
 // Adds the vibration of burst.vibration to the fit.
 void harmonics_begin_vibration(void);
 bool harmonics_fit_vibration(uint32_t next);
 
-// Second reading: sorts what motion and vibration leave into bins of the phase.
+// Second reading: sorts the residual of motion and vibration into bins of the phase.
 bool harmonics_clear(uint32_t next);
 void harmonics_begin_second_reading(void);
 void harmonics_read_second(const uint32_t words[CALIBRATION_WORDS]);
@@ -49,8 +49,8 @@ bool harmonics_fold(uint32_t next);
 bool harmonics_project(uint32_t next);
 bool harmonics_add_order(struct calibration_pass* pass);  // returns true with the last order
 
-// The standard error of the pass, 2^-20 period; above 2^31 if the pass says nothing about an order.
-// `*even` becomes whether it says about equally much about all of them.
+// The standard error of the pass, 2^-20 period; above 2^31 if the pass has no information about an
+// order. `*even` becomes true if it has about as much information about each order.
 uint32_t harmonics_scatter(const struct calibration_pass* pass, bool* even);
 
 #endif

@@ -18,8 +18,8 @@ void spectrum_put(uint32_t block, int32_t residual);
 bool spectrum_transform(uint32_t next);
 bool spectrum_weakest_lines(struct calibration_pass* pass, uint32_t next);
 
-// Finds the frequency of the vibration in this burst: near the line that no burst of the pass is
-// without. Returns false if there is none above 1.5 cycles a burst.
+// Finds the frequency of the vibration in this burst: near the line that is present in every burst
+// of the pass. Returns false if there is none above 1.5 cycles a burst.
 bool spectrum_find_vibration(void);
 
 #endif

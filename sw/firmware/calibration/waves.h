@@ -9,7 +9,7 @@
 
 extern const int16_t sine_table[WAVES_POINTS + WAVES_POINTS / 4];
 
-// Of a point of the circle.
+// Sine and cosine of a point of the circle.
 
 static inline int32_t sine_at(uint32_t point) { return sine_table[point % WAVES_POINTS]; }
 
@@ -17,7 +17,7 @@ static inline int32_t cosine_at(uint32_t point) {
     return sine_table[point % WAVES_POINTS + WAVES_POINTS / 4];
 }
 
-// Of any phase, one period = 2^16; within 3 LSB.
+// Sine and cosine of any phase, one period = 2^16; within 3 LSB.
 int32_t sine_of(uint32_t phase);
 int32_t cosine_of(uint32_t phase);
 

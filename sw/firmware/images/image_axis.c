@@ -7,8 +7,9 @@
 #include "bus/segments.h"
 
 const struct image_part image_parts[] = {
-    {calibration_axes_start, calibration_axes_work, calibration_axes_operation},
-    {segments_start, segments_work, segments_operation},
-    {scope_start, scope_work, scope_operation},
+    {calibration_axes_start, calibration_axes_work, calibration_axes_operation,
+     calibration_axes_idle},
+    {segments_start, segments_work, segments_operation, segments_idle},
+    {scope_start, scope_work, scope_operation, scope_idle},
 };
 const unsigned image_part_count = sizeof image_parts / sizeof *image_parts;

@@ -4,6 +4,6 @@
 #include "bus/scope.h"
 
 const struct image_part image_parts[] = {
-    {scope_start, scope_work, scope_operation},
+    {scope_start, scope_work, scope_operation, scope_idle},
 };
 const unsigned image_part_count = sizeof image_parts / sizeof *image_parts;

@@ -22,17 +22,17 @@ _Static_assert(BUS_SETTING_COUNT + HARDWARE_AXES * BUS_PARAMETER_COUNT <= VALUE_
                "the EEPROM holds all values");
 
 const struct image_part image_parts[] = {
-    {settings_start, 0, settings_operation},
-    {sensor_start, sensor_work, sensor_operation},
-    {turn_start, turn_work, turn_operation},
-    {peer_start, peer_work, peer_operation},
-    {i2c_start, i2c_work, 0},
-    {saved_values_start, 0, nonvolatile_operation},
-    {store_start, store_work, 0},
-    {edm_start, edm_work, 0},
-    {job_start, job_work, job_operation},
-    {panel_start, panel_work, 0},
-    {readout_start, readout_work, 0},
-    {scope_start, scope_work, scope_operation},
+    {settings_start, 0, settings_operation, 0},
+    {sensor_start, sensor_work, sensor_operation, 0},
+    {turn_start, turn_work, turn_operation, 0},
+    {peer_start, peer_work, peer_operation, 0},
+    {i2c_start, i2c_work, 0, 0},
+    {saved_values_start, 0, nonvolatile_operation, 0},
+    {store_start, store_work, 0, 0},
+    {edm_start, edm_work, 0, 0},
+    {job_start, job_work, job_operation, 0},
+    {panel_start, panel_work, 0, 0},
+    {readout_start, readout_work, 0, 0},
+    {scope_start, scope_work, scope_operation, scope_idle},
 };
 const unsigned image_part_count = sizeof image_parts / sizeof *image_parts;

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // main -- starts everything, then polls bus, clock, axes and the parts of the image in turn. There
-// are no interrupts, and no function waits.
+// are no interrupts, and no function waits. When all of them are idle, the core waits between two
+// rounds, until a word of the bus is received or the time is over.
 #include "axis/axis.h"
 #include "core/clock.h"
 #include "core/hardware.h"
 #include "core/image.h"
 #include "bus/bus.h"
 #include "axis/parameters.h"
+#include "planner/planner.h"
+
+#define LONGEST_IDLE_TICKS 64u  // 16 ms
 
 static unsigned axes;  // number that may be accessed: 0 if the register maps differ
 
@@ -38,9 +42,25 @@ void firmware_poll(void) {
     }
 }
 
+uint32_t firmware_idle_ticks(void) {
+    uint32_t ticks = axes && bus_idle() ? LONGEST_IDLE_TICKS : 0;
+    for (unsigned n = 0; n < axes && ticks; n++) {
+        uint32_t most = axis_idle_ticks(n);
+        if (most < ticks) ticks = most;
+    }
+    for (unsigned part = 0; part < image_part_count && ticks; part++)
+        if (image_parts[part].work && (!image_parts[part].idle || !image_parts[part].idle()))
+            ticks = 0;
+    return ticks;
+}
+
 int main(void) {
     firmware_start();
-    while (hardware_stack_intact()) firmware_poll();
+    const uint32_t tick_cycles = node_read(NODE_CLK_HZ) / PLANNER_TICK_HZ;
+    while (hardware_stack_intact()) {
+        firmware_poll();
+        node_write(NODE_WAIT_TIME, firmware_idle_ticks() * tick_cycles);
+    }
     hardware_halt();
     return 0;
 }

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x391503CDu    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xFD44F463u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -182,9 +182,12 @@ enum bus_signal_fault {    // bits
 
 enum bus_calibration_action {
     BUS_CALIBRATION_ACTION_READ = 0,    // change nothing, only report
-    BUS_CALIBRATION_ACTION_CALIBRATE = 1,    // calibrate from now on
-    BUS_CALIBRATION_ACTION_FREEZE = 2,    // stop the calibration; the correction stays in use
-    BUS_CALIBRATION_ACTION_CLEAR = 3,    // remove the correction and start again
+    BUS_CALIBRATION_ACTION_CALIBRATE = 1,    // calibrate during every motion from now on
+    BUS_CALIBRATION_ACTION_FREEZE = 2,    // stop the calibration; the correction stays in force
+    // remove the correction: nothing is corrected any more, and a calibration starts again
+    BUS_CALIBRATION_ACTION_CLEAR = 3,
+    // follow the drift of offsets, gain and quadrature error from now on
+    BUS_CALIBRATION_ACTION_FOLLOW = 4,
 };
 
 enum bus_scope_trigger {
@@ -875,7 +878,8 @@ enum bus_parameter {
     // [0.001 s] interlock: longest silence of the bus while a drive is on (all axes); 0: no limit,
     // for a machine that runs without a host
     BUS_PARAMETER_WATCHDOG_TIME = 32,
-    // correction of sine and cosine: 0 frozen, 1 calibrates while the axis moves
+    // correction of sine and cosine: 0 frozen, 1 calibrates while the axis moves, 2 follows the
+    // drift of offsets, gain and quadrature error
     BUS_PARAMETER_AUTO_CALIBRATION = 33,
     // decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulse and direction; other than 0
     // needs disagreement_limit 0
@@ -908,8 +912,8 @@ enum bus_parameter {
     BUS_PARAMETER_SIGNAL_BALANCE = 47,
     // signal: largest good amplitude times sine of the phase error; 65535 off
     BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR = 48,
-    // position from: 0 interpolated sine and cosine (needs SINE, else 1 is the default), 1 counts
-    // of A/B, 2 the steps that the axis sends
+    // position from: 0 interpolated sine and cosine (needs HAS_SINE, else 1 is the default), 1
+    // counts of A/B, 2 the steps that the axis sends
     BUS_PARAMETER_POSITION_SOURCE = 49,
     // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, distance, phase zero),
     // -2 S3 (index on either side)
@@ -1011,7 +1015,7 @@ enum bus_parameter {
     X(encoder_fault_mask, 30, 0LL, 63LL, 30LL) \
     X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
     X(watchdog_time, 32, 0LL, 65535LL, 500LL) \
-    X(auto_calibration, 33, 0LL, 1LL, 0LL) \
+    X(auto_calibration, 33, 0LL, 2LL, 0LL) \
     X(decoder_mode, 34, 0LL, 3LL, 0LL) \
     X(filter_skip, 35, 0LL, 1000000LL, 0LL) \
     X(filter_tolerated, 36, 0LL, 15LL, 0LL) \

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x49d04e40u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xbbfab873u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -160,6 +160,12 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_START_AXES_MASK 0x000000ffu
 #define NODE_START_AXES_SHIFT 0
 #define NODE_START_AXES_WIDTH 8
+// w: longest wait of the soft core; writing lets its next access to a register wait for this time,
+// or until a word of the bus is received [cycle]
+#define NODE_WAIT_TIME 0x028u
+#define NODE_WAIT_TIME_MASK 0x00ffffffu
+#define NODE_WAIT_TIME_SHIFT 0
+#define NODE_WAIT_TIME_WIDTH 24
 
 // RS-485 bus: 9-bit UART, address filter, frame check, watchdog
 // rw: duration of one bit [1/16 cycle]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// settings -- what is set once in a station: tolerances, times, roles. Each is read where it is
-// used, so a change is in force at once.
+// settings -- the values that are set once in a station: tolerances, times, roles. Each is read
+// where it is used, so a change is in force at once.
 #include "station/settings.h"
 
 #include "bus/bus.h"

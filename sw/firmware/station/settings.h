@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// settings -- what is set once in a station: tolerances, times, roles. They belong to the node; the
-// parameters belong to its axes.
+// settings -- the values that are set once in a station: tolerances, times, roles. They belong to
+// the node; the parameters belong to its axes.
 #ifndef MOIRE_SETTINGS_H
 #define MOIRE_SETTINGS_H
 
 #include <stdint.h>
 
-void settings_start(unsigned axes);  // all are at their defaults
+void settings_start(unsigned axes);  // sets all to their defaults
 uint8_t settings_operation(uint8_t operation);
 
 // By their bus_setting, in the unit of bus.toml.

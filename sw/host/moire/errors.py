@@ -113,7 +113,7 @@ class MotionFailed(MoireError):
 
 
 class NotCalibrated(MoireError):
-    """The correction was not learned in time. `cause` is the name of the reason in bus.toml."""
+    """The calibration has not ended in time. `cause` is the name of the reason in bus.toml."""
 
     def __init__(self, cause: str, sentence: str):
         super().__init__(sentence)

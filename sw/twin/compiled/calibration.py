@@ -14,6 +14,7 @@ from twin.compiled.host_library import host_library
 ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS = 10, 256, 1024, 2048, 39
 PERIODS, LINES, WORDS_AT_ONCE = 15, 128, 4
 NOTHING, SAMPLES, PHASES, WORDS, WORK, LOADING = range(6)
+FROZEN, CALIBRATES, FOLLOWS = range(3)
 MODULES = [
     FIRMWARE / "calibration" / f"{name}.c"
     for name in (
@@ -30,7 +31,7 @@ MODULES = [
 
 class Values(ctypes.Structure):
     """struct calibration_values: offsets in 2^-15 of full scale, gain and quadrature error in
-    2^-16, harmonics in 2^-24 period.
+    2^-16, harmonics and shift in 2^-24 period.
     """
 
     _fields_ = [
@@ -40,6 +41,7 @@ class Values(ctypes.Structure):
         ("quadrature_error", c_int32),
         ("cosine", c_int32 * ORDERS),
         ("sine", c_int32 * ORDERS),
+        ("shift", c_int32),
     ]
 
     def as_dict(self) -> dict[str, Any]:
@@ -51,6 +53,7 @@ class Values(ctypes.Structure):
             quadrature_error=self.quadrature_error,
             cosine=tuple(self.cosine),
             sine=tuple(self.sine),
+            shift=self.shift,
         )
 
 
@@ -74,12 +77,12 @@ class Pass(ctypes.Structure):
         ("slowest", c_uint32),
         ("fastest", c_uint32),
         ("every", c_uint16),
-        ("bursts", c_uint8),
+        ("bursts", c_uint16),
         ("spectra", c_uint8),
         ("line", c_uint8 * LINES),
         ("information", c_int32 * ORDERS),
-        ("cosine", c_int32 * ORDERS),
-        ("sine", c_int32 * ORDERS),
+        ("cosine", c_int64 * ORDERS),
+        ("sine", c_int64 * ORDERS),
         ("squares", c_int64),
     ]
 
@@ -101,9 +104,11 @@ class Calibration(ctypes.Structure):
         ("scatter_limit", c_uint16),
         ("reason", c_uint8),
         ("need", c_uint8),
-        ("frozen", c_bool),
+        ("mode", c_uint8),
         ("harmonics", c_bool),
         ("complete", c_bool),
+        ("referenced", c_bool),
+        ("beside", c_int32 * 4),
         ("refused", c_uint32),
         ("accepted", c_uint32),
         ("scatter", c_uint32),
@@ -164,7 +169,8 @@ class CalibrationRun:
         self.call("open", c_uint16(every), spoiled)
         take, calibration = library().calibration_take, ctypes.byref(self.calibration)
         given = (c_uint32 * len(words))(*words)
-        at_once = WORDS_AT_ONCE if self.calibration.harmonics else 1
+        phases = self.calibration.harmonics and self.calibration.mode != FOLLOWS
+        at_once = WORDS_AT_ONCE if phases else 1
         while self.idle() == WORDS:
             for n in range(0, len(words), at_once):
                 take(calibration, ctypes.byref(given, 4 * n))

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Microchip 24AA128: 16 KiB in pages of 64 bytes. A write rolls over within its page and begins
 // with the stop; until it has ended the device does not acknowledge. The whole page is written
-// again, so a power cut meanwhile may leave each of its bytes as it was, as it should be, or as
-// neither.
+// again, so a power cut during the write may leave each of its bytes with its old value, its new
+// value, or any other.
 #pragma once
 #include <algorithm>
 #include <array>

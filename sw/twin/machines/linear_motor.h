@@ -3,8 +3,9 @@
 // guides with a flexure and a cable, linear scale with a reference mark, end stops and limit
 // switches.
 //
-//   m dv/dt = constant * current - flexure x - cable (x - cable position) - friction +
-//   stops + force from outside
+//   m dv/dt = drive - springs - friction + stops + force from outside
+//   drive   = constant * current
+//   springs = flexure x + cable (x - cable position)
 #pragma once
 #include "parts/dac_input.h"
 #include "parts/friction.h"

@@ -77,7 +77,7 @@ class Machine {
     virtual void drive_changed(uint64_t, unsigned /*before*/, unsigned /*after*/) {}
     virtual void move(uint64_t now) = 0;  // by one time step, that ends now
     virtual uint64_t sense(
-        uint64_t now) = 0;  // look at the machine; returns the cycle to look again at the latest
+        uint64_t now) = 0;  // update the pins; returns the cycle of the next update at the latest
     virtual double* parameter(const char* name) = 0;  // nullptr: there is none
     virtual void configure() = 0;  // take over changed parameters, keep the state
     virtual bool own_fault(const char*, bool) { return false; }

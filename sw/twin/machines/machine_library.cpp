@@ -121,12 +121,13 @@ void stage_hold(Bench* bench, int rotor, int table) {
     stage_of(bench).plant.drivetrain.jammed = rotor;
     stage_of(bench).plant.drivetrain.clamped = table;
 }
-void stage_analogue(Bench* bench, double position, double* out) {
-    stage_of(bench).interferometer.analogue(position, out[0], out[1]);
+// of a table at a position, with a velocity, at a time after power-up
+void stage_analogue(Bench* bench, double position, double velocity, double seconds, double* out) {
+    stage_of(bench).interferometer.analogue({position, velocity, seconds}, out[0], out[1]);
 }
-void stage_convert(Bench* bench, double position, uint32_t* out) {
+void stage_convert(Bench* bench, double position, double velocity, double seconds, uint32_t* out) {
     Interferometer& interferometer = stage_of(bench).interferometer;
-    interferometer.sample(position);
+    interferometer.sample({position, velocity, seconds});
     out[0] = interferometer.code_sin;
     out[1] = interferometer.code_cos;
 }
@@ -134,7 +135,7 @@ void stage_convert(Bench* bench, double position, uint32_t* out) {
 // cosine in bit 1.
 void stage_frame(Bench* bench, double position, int count, uint8_t* bits) {
     Interferometer& interferometer = stage_of(bench).interferometer;
-    interferometer.chip_select(position);
+    interferometer.chip_select({position});
     for (int n = 0; n < count; n++) {
         bits[n] = uint8_t(interferometer.sdata_sin() | interferometer.sdata_cos() << 1);
         interferometer.next_bit();
@@ -144,7 +145,7 @@ void stage_frame(Bench* bench, double position, int count, uint8_t* bits) {
 // present cycle on.
 void stage_levels(Bench* bench, uint64_t clk, double from, double speed, uint8_t* out) {
     for (uint64_t n = 0; n < clk; n++) {
-        stage_of(bench).look(++bench->now, from + speed * double(n) / bench->clk_hz);
+        stage_of(bench).levels_at(++bench->now, {from + speed * double(n) / bench->clk_hz, speed});
         out[n] = uint8_t(bench->machine->levels() & (ENCODER_A | ENCODER_B));
     }
 }

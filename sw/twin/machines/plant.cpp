@@ -37,13 +37,16 @@ void Plant::step(const BridgeTime& bridge, double dt) {
     double charge = 0;
     auto share = [&](uint32_t clk) { return dt * clk / total; };
 
-    if (bridge.forward) conduct(p.supply_voltage - back, share(bridge.forward), charge);
-    if (bridge.reverse) conduct(-p.supply_voltage - back, share(bridge.reverse), charge);
+    const double supply = p.supply_voltage + p.supply_ripple * std::sin(hum_);
+    if (p.supply_ripple != 0) hum_ += 2 * M_PI * p.supply_hum * dt;
+
+    if (bridge.forward) conduct(supply - back, share(bridge.forward), charge);
+    if (bridge.reverse) conduct(-supply - back, share(bridge.reverse), charge);
     if (bridge.brake) conduct(-back, share(bridge.brake), charge);
     if (bridge.coast &&
         current != 0) {  // the diodes feed the current back into the supply until it ends
         const double sign = current > 0 ? 1 : -1,
-                     against = -sign * (p.supply_voltage + 2 * p.supply_diode_drop) - back;
+                     against = -sign * (supply + 2 * p.supply_diode_drop) - back;
         const double end = against / p.motor_resistance,
                      tau = p.motor_inductance / p.motor_resistance;
         const double seconds = share(bridge.coast),
@@ -58,7 +61,13 @@ void Plant::step(const BridgeTime& bridge, double dt) {
     const double mean = charge / dt;
     voltage = mean * p.motor_resistance + back + p.motor_inductance * (current - before) / dt;
 
-    drivetrain.step(p.motor_constant * mean, dt);
+    double torque = p.motor_constant * mean;
+    if (p.motor_ripple != 0)
+        torque *= 1 + p.motor_ripple * std::sin(p.motor_segments * drivetrain.angle);
+    if (p.motor_cogging != 0)
+        torque += p.motor_cogging * std::sin(p.motor_slots * drivetrain.angle);
+    if (p.screw_error != 0) drivetrain.error = p.screw_error * std::sin(drivetrain.angle);
+    drivetrain.step(torque, dt);
     switches.move(drivetrain.position, random_);
 }
 

@@ -31,6 +31,7 @@ class Plant {
 
     const StageParameters& p;
     RandomSource random_;
+    double hum_ = 0;  // phase of the supply's ripple, rad
 };
 
 }  // namespace twin

@@ -3,9 +3,9 @@
 // A/B/Z. A pure function of angle and time, drawn by the seed.
 //
 //   measured = angle + sum of a_k sin(k angle + phase_k) + error within a line + drift(time)
-//   orders   1 eccentricity, 2 tilt, 3 distortion of the ring, the higher ones fall as 1/k; all
-//   scaled so that their peak over a turn is
-//            ring_peak
+//
+// Order 1 is the eccentricity, 2 the tilt and 3 the distortion of the ring; the higher ones fall as
+// 1/k. All are scaled so that their peak over a turn is ring_peak.
 #pragma once
 #include <array>
 #include <cstdint>

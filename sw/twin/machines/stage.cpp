@@ -10,36 +10,53 @@ Stage::Stage(const StageParameters& parameters, uint64_t seed, uint64_t stream, 
     : Machine(clk_hz, parameters.time_step),
       p_(parameters),
       plant(p_, seed, stream),
-      interferometer(p_, seed, stream + 1, clk_hz) {
+      interferometer(p_, seed, stream + 1, clk_hz),
+      piezo(seed, stream),
+      seed_(seed),
+      stream_(stream) {
     piezo.configure(p_);
+    floor_.configure(p_.floor_velocity, time_step(), seed_, stream_);
 }
 
 void Stage::configure() {
     plant.configure();
     interferometer.configure();
     piezo.configure(p_);
+    floor_.configure(p_.floor_velocity, time_step(), seed_, stream_);
+}
+
+double Stage::coupled(uint64_t now) const {
+    if (coupling_ == 0) return 0;
+    return coupling_ * std::exp(-double(now - bridge_edge_) / clk_hz() / p_.signal_coupling_time);
 }
 
 void Stage::drive_changed(uint64_t now, unsigned before, unsigned after) {
     spend(now - 1, before);  // cycle `now` itself is the first of the new state
     const unsigned falling = before & ~after;
     if (falling & ADC_CS_N)
-        interferometer.chip_select(position(now));
+        interferometer.chip_select(table(now), coupled(now));
     else if ((falling & ADC_SCLK) && !(after & ADC_CS_N))
         interferometer.next_bit();
     dac.drive_changed(before, after);
+    constexpr unsigned BRIDGE = BRIDGE_A | BRIDGE_B;
+    if (p_.signal_coupling != 0 && ((before ^ after) & BRIDGE)) {
+        const bool rises = ~before & after & BRIDGE;
+        coupling_ = (rises ? 1 : -1) * p_.signal_coupling;
+        bridge_edge_ = now;
+    }
 }
 
 void Stage::move(uint64_t now) {
     spend(now, drive());
-    plant.drivetrain.external_force = pushed_ + piezo.reaction;
+    const double shaken = floor_.step();
+    plant.drivetrain.external_force = pushed_ + piezo.reaction - p_.table_mass * shaken;
     plant.step({spent_[0], spent_[1], spent_[2], spent_[3]}, time_step());
     spent_ = {};
-    if (p_.piezo_fitted != 0) piezo.step(dac.share(), time_step());
+    if (p_.piezo_fitted != 0) piezo.step(dac.share(), time_step(), shaken);
 }
 
 uint64_t Stage::sense(uint64_t now) {
-    const uint64_t spike = look(now, position(now));
+    const uint64_t spike = levels_at(now, table(now));
     const bool moves = std::fabs(velocity()) * time_step() > 1e-9;
     return moves ? std::min(spike, now + std::max<uint64_t>(1, step_clk() / LEVELS_PER_STEP))
                  : spike;

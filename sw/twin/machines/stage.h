@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stage of S0: plant, optionally with a piezo on its table; interferometer and ADC.
+// The stage of S0: plant, optionally with a piezo on its table; interferometer and ADC; the floor
+// under it, which shakes the table and the platform on the piezo.
 #pragma once
 #include <array>
 
 #include "parts/dac_input.h"
+#include "parts/floor.h"
 #include "parts/interferometer.h"
 #include "machines/machine.h"
 #include "parts/piezo.h"
@@ -33,7 +35,10 @@ class Stage : public Machine {
         return plant.drivetrain.position + piezo.position + velocity() * since(now);
     }
     double velocity() const { return plant.drivetrain.velocity + piezo.velocity; }
-    uint64_t look(uint64_t now, double position) { return interferometer.advance(now, position); }
+    Motion table(uint64_t now) const { return {position(now), velocity(), double(now) / clk_hz()}; }
+    uint64_t levels_at(uint64_t now, const Motion& motion) {
+        return interferometer.advance(now, motion);
+    }
 
  protected:
     unsigned pins() const override {
@@ -68,7 +73,12 @@ class Stage : public Machine {
     Piezo piezo;
 
  private:
-    double pushed_ = 0;
+    double coupled(uint64_t now) const;  // LSB, from the last edge of the bridge to the converters
+
+    uint64_t seed_, stream_;
+    Floor floor_;
+    double pushed_ = 0, coupling_ = 0;  // N; LSB at the last edge of the bridge
+    uint64_t bridge_edge_ = 0;          // cycle of that edge
     uint64_t spent_until_ = 0;
     std::array<uint32_t, 4> spent_{};  // cycles in: coast, forward, reverse, brake
 };

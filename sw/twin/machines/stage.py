@@ -13,8 +13,8 @@ from twin.parameters import tables as parameters
 
 FUNCTIONS: Functions = {
     "stage_hold": (None, [HANDLE, WHOLE, WHOLE]),
-    "stage_analogue": (None, [HANDLE, REAL, HANDLE]),
-    "stage_convert": (None, [HANDLE, REAL, HANDLE]),
+    "stage_analogue": (None, [HANDLE, REAL, REAL, REAL, HANDLE]),
+    "stage_convert": (None, [HANDLE, REAL, REAL, REAL, HANDLE]),
     "stage_frame": (None, [HANDLE, REAL, WHOLE, HANDLE]),
     "stage_levels": (None, [HANDLE, ctypes.c_uint64, REAL, REAL, HANDLE]),
     "friction_slide": (REAL, [REAL] * 8 + [WHOLE]),
@@ -33,16 +33,20 @@ class Stage(Machine):
         """Clamp the rotor or the table."""
         self.library.stage_hold(self.bench, rotor, table)
 
-    def analogue(self, position_m: float) -> tuple[float, ...]:
-        """Sine and cosine as fractions of full scale, without noise."""
+    def analogue(
+        self, position_m: float, velocity_m_s: float = 0.0, seconds: float = 0.0
+    ) -> tuple[float, ...]:
+        """Sine and cosine as fractions of full scale, without noise, so long after power-up."""
         out = (ctypes.c_double * 2)()
-        self.library.stage_analogue(self.bench, position_m, out)
+        self.library.stage_analogue(self.bench, position_m, velocity_m_s, seconds, out)
         return tuple(out)
 
-    def convert(self, position_m: float) -> tuple[int, ...]:
-        """One conversion: codes of sine and cosine."""
+    def convert(
+        self, position_m: float, velocity_m_s: float = 0.0, seconds: float = 0.0
+    ) -> tuple[int, ...]:
+        """One conversion so long after power-up: codes of sine and cosine."""
         out = (ctypes.c_uint32 * 2)()
-        self.library.stage_convert(self.bench, position_m, out)
+        self.library.stage_convert(self.bench, position_m, velocity_m_s, seconds, out)
         return tuple(out)
 
     def frame(self, position_m: float, edges: int) -> list[tuple[int, int]]:

@@ -14,7 +14,7 @@ from twin.machines.machine import FUNCTIONS as MACHINE_FUNCTIONS
 from twin.machines.machine import declare, pack
 from twin.nodes.twin import BAUD, FUNCTIONS
 
-CYCLES = 600_000  # firmware starts within a tenth of them
+CYCLES = 1_200_000  # the soft core waits from 900 000 on
 ASK_CYCLES = 100_000  # from one question of the host to the next
 QUESTION = [0x111]  # to node 1: send your last reply
 MACHINE = "stage"

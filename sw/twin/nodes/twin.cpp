@@ -40,16 +40,20 @@ class Core {  // a Verilated node and its clock
         set_peripheral_pins(pins, PERIPHERAL_SENSE_IDLE);
         pins.rst = 1;
         model_->eval();
-        if (SERIAL_CORE)
-            flash_.emplace(firmware);
-        else
-            std::copy(firmware.begin(), firmware.end(), &pins.NODE_MEMORY[0]);
-        for (int n = 0; n < RESET_CLK; n++) clk();
+        if (SERIAL_CORE) flash_.emplace(firmware);
+#ifdef NODE_MEMORY  // a netlist has its firmware since synthesis
+        if (!SERIAL_CORE) std::copy(firmware.begin(), firmware.end(), &pins.NODE_MEMORY[0]);
+#endif
+        for (int n = 0; n < RESET_CLK; n++)
+            for (const int level : {1, 0}) {
+                pins.clk = level;
+                model_->eval();
+            }
         pins.rst = 0;
     }
     ~Core() { model_->final(); }
-    void clk() {
-        rising_edge(pins);
+    void clk() {  // not in reset
+        rising_edge(pins, rest_);
         if (SERIAL_CORE)
             pins.flash_miso = flash_->clk(pins.flash_cs_n, pins.flash_sclk, pins.flash_mosi);
     }
@@ -57,6 +61,7 @@ class Core {  // a Verilated node and its clock
  private:
     std::unique_ptr<VerilatedContext> context_;
     std::unique_ptr<Vnode> model_;
+    Rest rest_;
     std::optional<SerialFlash> flash_;
 
  public:

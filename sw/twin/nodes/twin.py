@@ -143,9 +143,11 @@ class BusState:
     words_waiting: int
 
 
-def library(clk_hz: int, axes: int, node: Mapping[str, int] | None = None) -> ctypes.CDLL:
+def library(
+    clk_hz: int, axes: int, words: Sequence[int], node: Mapping[str, int] | None = None
+) -> ctypes.CDLL:
     """The library of a build, with its functions declared."""
-    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node)))
+    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node, words)))
     declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **DEVICES_FUNCTIONS, **PEER_FUNCTIONS})
     return found
 
@@ -206,8 +208,9 @@ class Twin:
             for node in built
             for axis in [*node.axes, *[Axis("unconnected")] * (self.node_axes - len(node.axes))]
         ]
+        words = build.firmware(axes=self.node_axes) if firmware is None else firmware
         self.library, self.clk_hz, self.baud = (
-            library(clk_hz, self.node_axes, node_parameters),
+            library(clk_hz, self.node_axes, words, node_parameters),
             clk_hz,
             baud,
         )
@@ -219,9 +222,7 @@ class Twin:
             )
             for n, axis in enumerate(fitted)
         ]
-        image = memory_image(
-            self.library, build.firmware(axes=self.node_axes) if firmware is None else firmware
-        )
+        image = memory_image(self.library, words)
         addresses = array(self.addresses, numpy.uint8)
         kinds = (ctypes.c_char_p * self.axes)(*(axis.machine.encode() for axis in fitted))
         tables = (ctypes.c_void_p * self.axes)(*(ctypes.addressof(table) for table in packed))
@@ -568,9 +569,8 @@ def cells_of(words: Sequence[int], gap_cells: int = 0) -> list[int]:
 
 
 class FrameBench:
-    """One node without a machine at a low clk (16 clk a bit: the firmware keeps its baud): for 10^5
-    damaged frames.
-    One made with another clk_hz (whole kHz) is another build.
+    """One node without a machine, with a slow clock: 16 cycles a bit, at the baud rate of the
+    firmware. It is for 10^5 damaged frames. One with another clk_hz (whole kHz) is another build.
 
     exchange(levels) puts bit cells on the line as they are and returns the words that the node
     answered."""
@@ -583,8 +583,9 @@ class FrameBench:
         firmware: Sequence[int] | None = None,
     ) -> None:
         self.handle: int | None = None
-        self.library, self.clk_hz = library(clk_hz, 1, NODE), clk_hz
-        image = memory_image(self.library, build.firmware(axes=1) if firmware is None else firmware)
+        words = build.firmware(axes=1) if firmware is None else firmware
+        self.library, self.clk_hz = library(clk_hz, 1, words, NODE), clk_hz
+        image = memory_image(self.library, words)
         self.handle = self.library.frame_bench_new(
             address, image.ctypes.data, len(image), clk_hz / baud
         )
@@ -601,7 +602,7 @@ class FrameBench:
         """Returns when `enough` words are there, or the line was quiet for quiet_cells after the
         last level or the answer; at
         the latest after most_cells. A node takes up to 60 cells to answer a request, at a low
-        clk."""
+        clock."""
         sent = array(levels, numpy.uint8)
         count = self.library.frame_bench_exchange(
             self.handle,

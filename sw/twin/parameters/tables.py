@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
+WORLDS = ("typical", "bad")
 MACHINES = tuple(sorted(file.stem for file in HERE.glob("*.toml")))
 
 
@@ -44,6 +45,21 @@ def values(
             )
         result[name] = float(value)
     return result
+
+
+def world(name: str, machine: str = "stage") -> dict[str, float]:
+    """{parameter: value} of all effects of a machine in a "typical" or a "bad" world.
+
+    An effect is a parameter with a bad value; its typical value is `value` unless it is given.
+    ValueError for another world.
+    """
+    if name not in WORLDS:
+        raise ValueError(f"there is no world {name}; there are {', '.join(WORLDS)}")
+    return {
+        parameter: float(entry.get(name, entry["value"]))
+        for parameter, entry in load(machine).items()
+        if "bad" in entry
+    }
 
 
 def structure(machine: str) -> str:

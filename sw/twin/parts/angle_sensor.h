@@ -2,11 +2,12 @@
 // Absolute angle sensor (time grating, S4) that sends frames by itself over a serial line, 8 data
 // bits, no parity, one stop bit:
 //
-//   A5 · sequence · angle (4 bytes, low first, 2^32 a turn) · CRC-16 of the six bytes before (low
-//   first; 0x1021, starts at 0xFFFF)
+//   A5 · sequence · angle · CRC-16
 //
-// The angle is that of `latency` before the first start bit. A share of the frames is left out,
-// another has one byte damaged; their sequence numbers are counted all the same.
+// The angle has four bytes, low first, 2^32 a turn. The CRC-16 covers the six bytes before it, low
+// byte first, with the polynomial 0x1021 and the start 0xFFFF. The angle was measured `latency`
+// before the first start bit. A share of the frames is left out, and another share has one damaged
+// byte; the sequence numbers of both are counted.
 #pragma once
 #include <algorithm>
 #include <array>

@@ -2,9 +2,11 @@
 // Motor shaft, transmission with spring and backlash, body on guides between end stops. For a body
 // that turns read kgm2, rad and Nm for kg, m and N.
 //
-//   nut    = angle * travel per radian + error           where the transmission would carry the
-//   body without a force force  = preload + spring and damper between nut and body, beyond the
-//   backlash on either side
+//   nut    = angle * travel per radian + error
+//   force  = preload + spring and damper between nut and body
+//
+// The nut is where the transmission would carry the body without a force. Spring and damper act
+// beyond the backlash on either side.
 #pragma once
 #include "parts/friction.h"
 

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Friction with presliding: the elasto-plastic single-state model of Dupont, Hayward, Armstrong and
 // Altpeter, IEEE Trans. Automatic Control 47 (2002) 787. Below break-away it is a spring that never
-// creeps, so stiction holds for ever; sliding steadily it gives Stribeck's curve  coulomb + (static
-// - coulomb) exp(-(v/stribeck)^2) + viscous v. The deflection is advanced by a step that is
-// implicit in the sliding term: stable at any speed and any step.
+// creeps, so stiction holds for ever. In steady sliding it gives Stribeck's curve:
+//
+//   coulomb + (static - coulomb) exp(-(v/stribeck)^2) + viscous v
+//
+// The deflection is advanced by a step that is implicit in the sliding term, so it is stable at any
+// speed and any step.
 #pragma once
 #include <cmath>
 

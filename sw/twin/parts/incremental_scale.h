@@ -36,7 +36,7 @@ class IncrementalScale {
         return ((quarter ^ quarter >> 1) & 1) * ENCODER_A | (quarter >> 1) * ENCODER_B |
                z_ * ENCODER_Z;
     }
-    double way_to_change(double position, double velocity) const {  // along the motion, m
+    double distance_to_change(double position, double velocity) const {  // along the motion, m
         double distance = velocity > 0 ? double(counts_ + 1) * count_ - position
                                        : position - double(counts_) * count_ + hysteresis_;
         for (const double edge : {index_ + rise_, index_ + width_ + rise_}) {
@@ -48,7 +48,7 @@ class IncrementalScale {
     // the cycle in which a body that moves on like this changes a level
     uint64_t next_change(uint64_t now, double position, double velocity, double clk_hz) const {
         const double clk =
-            velocity ? way_to_change(position, velocity) / std::fabs(velocity) * clk_hz : 1e18;
+            velocity ? distance_to_change(position, velocity) / std::fabs(velocity) * clk_hz : 1e18;
         return clk < 1e15 ? now + 1 + uint64_t(clk) : NEVER;
     }
     int64_t counts() const { return counts_; }  // floor of position / count, but for the hysteresis

@@ -7,6 +7,7 @@
 namespace twin {
 
 constexpr int LEADING_ZEROS = 2;
+constexpr double INL_SHAPE = 2.598076211353316;  // 3 sqrt(3) / 2: the largest of x - x^3 becomes 1
 
 Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream,
                                double clk_hz)
@@ -15,6 +16,7 @@ Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed,
       stream_(stream),
       clk_hz_(clk_hz),
       random_(seed, stream),
+      comparator_noise_(~seed, ~stream),
       spikes_a_{RandomSource(seed, stream + 1), 0, 0},
       spikes_b_{RandomSource(seed, stream + 2), 0, 0} {
     configure();
@@ -22,8 +24,6 @@ Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed,
 }
 
 void Interferometer::configure() {
-    sin_of_error_ = std::sin(p.signal_phase_error * M_PI / 180);
-    cos_of_error_ = std::cos(p.signal_phase_error * M_PI / 180);
     const double plus[] = {p.harmonic_plus_2, p.harmonic_plus_3, p.harmonic_plus_4,
                            p.harmonic_plus_5, p.harmonic_plus_6, p.harmonic_plus_7,
                            p.harmonic_plus_8};
@@ -40,6 +40,7 @@ void Interferometer::configure() {
     draw(spikes_a_, 0);
     draw(spikes_b_, 0);
     scale_error_.configure(p, seed_, stream_);
+    drift_.configure(p);
 }
 
 void Interferometer::draw(Spikes& spikes, uint64_t after) {
@@ -54,14 +55,20 @@ void Interferometer::draw(Spikes& spikes, uint64_t after) {
     spikes.end = spikes.start + (length < 1 ? 1 : uint64_t(length));
 }
 
-void Interferometer::analogue(double position, double& sine, double& cosine) const {
+void Interferometer::analogue(const Motion& table, double& sine, double& cosine) const {
     if (cut) {
         sine = cosine = 0;
         return;
     }
-    const double turns =
-                     (position + scale_error_.at(position) - p.grating_offset) / p.grating_period,
-                 phase = 2 * M_PI * (turns - std::floor(turns));
+    const double x = table.position;
+    const double turns = (x + scale_error_.at(x, table.time) - p.grating_offset) / p.grating_period;
+    const SignalErrors e = drift_.at(x, table.time);
+    double phase = 2 * M_PI * (turns - std::floor(turns)), amplitude = e.amplitude;
+    if (p.signal_bandwidth > 0) {  // one pole: at a steady velocity a lag and a loss
+        const double share = table.velocity / p.grating_period / p.signal_bandwidth;
+        phase -= std::atan(share);
+        amplitude /= std::sqrt(1 + share * share);
+    }
     double s, c;
     sincos(phase, &s, &c);
     const std::complex<double> first(c, s);
@@ -71,14 +78,17 @@ void Interferometer::analogue(double position, double& sine, double& cosine) con
         c += (plus_[k] + minus_[k]) * power.real();
         s += (plus_[k] - minus_[k]) * power.imag();
     }
-    sine = p.signal_amplitude * (s + p.signal_offset_sin);
-    cosine = p.signal_amplitude *
-             (p.signal_gain_cos * (c * cos_of_error_ - s * sin_of_error_) + p.signal_offset_cos);
+    sine = amplitude * (s + e.offset_sin);
+    cosine = amplitude * (e.gain_cos * (c * e.cos_of_error - s * e.sin_of_error) + e.offset_cos);
 }
 
-uint64_t Interferometer::advance(uint64_t now, double position) {
+uint64_t Interferometer::advance(uint64_t now, const Motion& table) {
     double sine, cosine;
-    analogue(position, sine, cosine);
+    analogue(table, sine, cosine);
+    if (p.comparator_noise > 0) {
+        sine += p.comparator_noise * p.signal_amplitude * comparator_noise_.normal();
+        cosine += p.comparator_noise * p.signal_amplitude * comparator_noise_.normal();
+    }
     const double threshold = p.comparator_hysteresis * p.signal_amplitude;
     clean_a_ = clean_a_ ? cosine > -threshold : cosine > threshold;
     clean_b_ = clean_b_ ? sine > -threshold : sine > threshold;
@@ -90,21 +100,28 @@ uint64_t Interferometer::advance(uint64_t now, double position) {
     return next(spikes_a_) < next(spikes_b_) ? next(spikes_a_) : next(spikes_b_);
 }
 
-uint32_t Interferometer::convert(double value) {
+uint32_t Interferometer::convert(double value, double coupled) {
     const double half = double(1 << (int(p.signal_bits) - 1)), most = 2 * half - 1;
-    double code = half + half * value + p.signal_noise * random_.normal();
+    double code = half + half * value + coupled + p.signal_noise * random_.normal();
+    if (p.signal_inl != 0) code += p.signal_inl * INL_SHAPE * value * (1 - value * value);
     if (p.signal_spike_share > 0 && random_.uniform() < p.signal_spike_share)
         code += half * p.signal_spike_size * random_.uniform(-1, 1);
     code = std::floor(code + 0.5);
     return uint32_t(code < 0 ? 0 : code > most ? most : code);
 }
 
-void Interferometer::sample(double position) {
+void Interferometer::sample(const Motion& table, double coupled) {
     if (converter_stuck) return;
     double sine, cosine;
-    analogue(position, sine, cosine);
-    code_sin = convert(sine);
-    code_cos = convert(cosine);
+    analogue(table, sine, cosine);
+    if (p.signal_skew != 0) {
+        double earlier;
+        const Motion later{table.position + table.velocity * p.signal_skew, table.velocity,
+                           table.time};
+        analogue(later, earlier, cosine);
+    }
+    code_sin = convert(sine, coupled);
+    code_cos = convert(cosine, coupled);
 }
 
 }  // namespace twin

@@ -3,35 +3,48 @@
 // and cosine through two converters that sample together, and the comparators' quadrature levels
 // with their spikes.
 //
-//   phase  = 2 pi (position + scale error - grating_offset) / period          sine = sin(phase)
-//   cosine = cos(phase), with their errors:
-//            harmonics +-2 ... +-8 are added to exp(i phase) first, then gain, phase and offset
-//            bend it
-//   levels   A = cosine > 0, B = sine > 0: at a rising edge of A, B = 0 means forward (S0)
-//   frame    AD7356 class: sampled at the falling edge of cs_n, which also puts out the first
-//   leading zero; each falling edge of
-//            sclk puts out the next bit: second leading zero, then the word, MSB first, straight
-//            binary, then zeros
+//   phase  = 2 pi (position + scale error - grating_offset) / period
+//   sine   = sin(phase) and cosine = cos(phase), with their errors
+//   levels: A = cosine > 0, B = sine > 0, with hysteresis and noise of the comparators
+//
+// Of the errors, the harmonics +-2 ... +-8 are added to exp(i phase) first, then gain, phase error
+// and offset; these may change with time and along the travel (signal_drift.h). At a rising edge of
+// A, B = 0 means forward (S0).
+//
+// A receiver of limited bandwidth delays and weakens the signals while the table moves. The
+// converter of the cosine samples later than that of the sine (skew). A converter bends its words
+// (integral nonlinearity: an S with its zeros at the ends and in the middle), and the edges of the
+// bridge couple into them.
+//
+// The frame is that of the AD7356 class. The falling edge of cs_n samples and puts out the first
+// leading zero; each falling edge of sclk puts out the next bit: the second leading zero, then the
+// word in straight binary, MSB first, then zeros.
 #pragma once
 #include <cstdint>
 
 #include "parameters.h"
 #include "parts/random_source.h"
 #include "parts/scale_error.h"
+#include "parts/signal_drift.h"
 
 namespace twin {
+
+struct Motion {                     // of the table against the reading head
+    double position, velocity = 0;  // m, m/s
+    double time = 0;                // s from power-up
+};
 
 class Interferometer {
  public:
     Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream,
                    double clk_hz);
 
-    uint64_t advance(
-        uint64_t now,
-        double position);  // levels in cycle `now`; returns the cycle of the next change of a spike
-    void sample(double position);        // conversion of both channels
-    void chip_select(double position) {  // falling edge of cs_n
-        sample(position);
+    // levels in cycle `now`; returns the cycle of the next change of a spike
+    uint64_t advance(uint64_t now, const Motion& table);
+    // conversion of both channels; coupled: what the bridge adds to both words, LSB
+    void sample(const Motion& table, double coupled = 0);
+    void chip_select(const Motion& table, double coupled = 0) {  // falling edge of cs_n
+        sample(table, coupled);
         shift_sin_ = code_sin << first_bit_;
         shift_cos_ = code_cos << first_bit_;
     }
@@ -41,8 +54,8 @@ class Interferometer {
     }
     unsigned sdata_sin() const { return shift_sin_ >> 31; }
     unsigned sdata_cos() const { return shift_cos_ >> 31; }
-    void analogue(double position, double& sine,
-                  double& cosine) const;  // of full scale, without noise
+    // of full scale, without noise
+    void analogue(const Motion& table, double& sine, double& cosine) const;
 
     void configure();  // take over changed parameters
 
@@ -56,7 +69,7 @@ class Interferometer {
         uint64_t start, end;
     };
     void draw(Spikes& spikes, uint64_t after);
-    uint32_t convert(double value);
+    uint32_t convert(double value, double coupled);
 
     const StageParameters& p;
     static constexpr int HIGHEST = 8;
@@ -64,9 +77,10 @@ class Interferometer {
     int highest_ = 0;                                          // of them that is not zero
     uint64_t seed_, stream_;
     ScaleError scale_error_;
-    double clk_hz_, sin_of_error_ = 0, cos_of_error_ = 1;
+    SignalDrift drift_;
+    double clk_hz_;
     int first_bit_ = 0;  // of the word, in the 32 bits that are shifted out
-    RandomSource random_;
+    RandomSource random_, comparator_noise_;
     Spikes spikes_a_, spikes_b_;
     bool clean_a_ = false, clean_b_ = false;
     uint32_t shift_sin_ = 0, shift_cos_ = 0;

@@ -2,23 +2,26 @@
 // Fine stage: amplifier with a slew limit, piezo with hysteresis and creep, a flexure with its
 // first mode, a mass on it.
 //
-//   hysteresis  Prandtl-Ishlinskii: y = w0 u + w sum play(u, r_i); the weights follow from the
-//   range, which the full loop reaches, and
-//               the width of that loop at its middle
-//   creep       nearly logarithmic: two relaxations per decade from 10 ms to 1000 s, together
-//   `creep` of
-//               the travel per decade
-//   mode        x'' + 2 d w x' + w^2 x = w^2 y
+//   hysteresis  y = w0 u + w sum play(u, r_i), as Prandtl and Ishlinskii have it
+//   mode        x'' + 2 d w x' + w^2 x = w^2 (y + noise) - acceleration of the base
+//
+// The weights of the hysteresis follow from the range, which the full loop reaches, and from the
+// width of that loop at its middle. The creep is nearly logarithmic: two relaxations per decade
+// from 10 ms to 1000 s, which together make `creep` of the travel per decade. The noise of
+// converter and amplifier is white and given by its density.
 #pragma once
 #include <array>
 #include <cmath>
 
 #include "parameters.h"
+#include "parts/random_source.h"
 
 namespace twin {
 
 class Piezo {
  public:
+    Piezo(uint64_t seed, uint64_t stream) : random_(~seed, stream ^ NOISE_STREAM) {}
+
     template <class P>
     void configure(const P& p) {
         range_ = p.piezo_range;
@@ -27,6 +30,7 @@ class Piezo {
         natural_ = 2 * M_PI * p.piezo_mode;
         damping_ = p.piezo_mode_damping;
         mass_ = p.piezo_mass;
+        noise_ = p.piezo_noise;
         double width = 0, travel = 0;  // of the full loop, for a weight of 1
         for (int i = 0; i < PLAYS; i++) {
             width += 2 * std::fmin(radius(i), 1 - radius(i));
@@ -35,7 +39,8 @@ class Piezo {
         weight_ = p.piezo_hysteresis * range_ / width;
         direct_ = (range_ - weight_ * travel) / 2;
     }
-    void step(double demanded, double dt) {  // demanded: -1..1 of the amplifier's swing
+    // demanded: -1..1 of the amplifier's swing; base: acceleration of the base, m/s2
+    void step(double demanded, double dt, double base = 0) {
         const double most = slew_ * dt;
         drive += std::fmax(-most, std::fmin(most, demanded - drive));
         double travel = direct_ * drive;
@@ -49,9 +54,11 @@ class Piezo {
             crept += state;
             tau *= RATIO;
         }
+        double demand = travel + crept;
+        if (noise_ != 0) demand += noise_ * std::sqrt(0.5 / dt) * random_.normal();
         const double acceleration =
-            natural_ * natural_ * (travel + crept - position) - 2 * damping_ * natural_ * velocity;
-        velocity += dt * acceleration;
+            natural_ * natural_ * (demand - position) - 2 * damping_ * natural_ * velocity;
+        velocity += dt * (acceleration - base);
         position += dt * velocity;
         reaction = -mass_ * acceleration;
     }
@@ -61,12 +68,14 @@ class Piezo {
     double reaction = 0;                // on the table, N
 
  private:
+    static constexpr uint64_t NOISE_STREAM = 0x7069657A6F;
     static constexpr int PLAYS = 10, PER_DECADE = 2, RELAXATIONS = 11;
     static constexpr double SHORTEST = 0.01, RATIO = 3.1622776601683795;  // s; two a decade
     static constexpr double radius(int i) { return (i + 1) / double(PLAYS + 1); }
 
     double range_ = 0, slew_ = 0, creep_ = 0, natural_ = 0, damping_ = 0, mass_ = 0, weight_ = 0,
-           direct_ = 0;
+           direct_ = 0, noise_ = 0;
+    RandomSource random_;
     std::array<double, PLAYS> play_{};
     std::array<double, RELAXATIONS> crept_{};
 };

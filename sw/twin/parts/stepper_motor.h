@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stepper motor and its driver: each rising edge of step turns the field by a microstep; the rotor
+// Stepper motor and its driver: each rising edge of step turns the field by a microstep. The rotor
 // hangs on the field by a spring whose torque is a sine of the angle between them, so a load above
-// the pull-out torque slips it by four full steps at a time.
+// the pull-out torque makes it slip by four full steps at a time.
 //
-//   torque = holding / sqrt(1 + (speed / corner)^2) * sin(poles (field - angle)) + damping (field
-//   speed - speed)
+//   torque = pull * sin(poles (field - angle)) + damping (field speed - speed)
+//   pull   = holding / sqrt(1 + (speed / corner)^2)
 //
 // While it is disabled there is no torque and steps are not taken.
 #pragma once

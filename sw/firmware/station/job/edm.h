@@ -22,7 +22,7 @@ void edm_start(unsigned axes);
 void edm_work(void);
 void edm_begin(void);    // sends the keys and follows the cut
 void edm_follow(void);   // follows the cut that is under way
-void edm_release(void);  // follows no longer; keys that are not being sent are taken back
+void edm_release(void);  // stops following; keys that are not being sent are taken back
 enum edm_state edm_state(void);
 uint8_t edm_cause(void);      // why it failed, a bus_cause
 bool edm_built(void);         // this node has a keyboard port and the status inputs

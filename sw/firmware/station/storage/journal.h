@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// journal -- what was last done to the work, written before and after each step of a job, so that a
-// loss of power never hides whether a cut had begun.
+// journal -- records each step of a job before and after it is done, so that a loss of power never
+// hides whether a cut had begun.
 #ifndef MOIRE_JOURNAL_H
 #define MOIRE_JOURNAL_H
 

@@ -17,10 +17,11 @@ struct record_copies {
     bool damaged;            // a copy is neither whole nor blank
 };
 
-// Before loading. `newest` is the copy that counts as the newest while neither is whole.
+// To be called before loading. `newest` is the copy that counts as the newest while neither is
+// whole.
 void record_copies_reset(struct record_copies* copies, uint8_t newest);
 
-// After both copies were read: sets `newest` and `damaged`.
+// To be called when both copies have been read: sets `newest` and `damaged`.
 void record_copies_choose(struct record_copies* copies);
 
 uint32_t record_copies_next_generation(void);

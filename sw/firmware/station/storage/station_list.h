@@ -16,7 +16,7 @@
 
 extern const struct store_client station_list_client;
 
-// The list in force. While it is loaded, and if there is none, it has no stations.
+// The list in force. It has no stations while it is being loaded, or if there is none.
 uint16_t station_list_count(void);              // stations
 uint32_t station_list_angle(unsigned station);  // 0.01 arcsec; station < station_list_count
 uint32_t station_list_generation(void);         // higher in each list that is saved; 0: none

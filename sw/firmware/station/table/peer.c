@@ -9,7 +9,7 @@
 //            main node requests, and the sub-node acts as it does on the bus. A request without a
 //            reply is sent again; a request that arrives again gets the same reply and is not done
 //            again. If a fault of the sub-node was the cause, the main node asks which; it resets
-//            the fault only when a person wants that.
+//            the fault only when a person requests it.
 #include "station/table/peer.h"
 
 #include "core/clock.h"
@@ -169,7 +169,7 @@ static void send_frame(const uint8_t* body, uint32_t length) {
     uint32_t crc = bus_crc(body, length), whole = length + CRC_BYTES, code = 0;
     if (FIELD_GET(peripherals_read(PERIPHERALS_PEER_STATE), PERIPHERALS_PEER_STATE_TRANSMIT_FREE) <
         whole + 3u)
-        return;  // nothing is better than half a frame
+        return;  // no frame rather than half a frame
     for (uint32_t n = 0; n < whole; n++) {
         uint8_t byte = (uint8_t)(n < length ? body[n] : crc >> 8 * (n - length));
         part[n + 1] = byte;

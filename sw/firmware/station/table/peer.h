@@ -27,7 +27,7 @@ uint8_t peer_cause(void);  // why it failed, a bus_cause
 // bus_fault bits of the sub-node if faults made it fail; only the first fault if it is known.
 uint16_t peer_faults(void);
 
-// A person wants the faults reset: the next turn begins with that.
+// A person requested a reset of the faults: the next turn begins with it.
 void peer_reset_fault(void);
 
 #endif

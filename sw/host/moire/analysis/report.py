@@ -62,14 +62,20 @@ class Lissajous:
     cos: Values
 
 
+# the heads of a table of numbers of a paper and ours
+AGAINST_THE_PAPER = ("", "the paper: a real machine", "here: its model in the twin", "")
+
+
 @dataclass(frozen=True)
 class Compared:
-    """A number of the paper and ours; `better` is None where neither is better."""
+    """A number of the paper, measured on a real machine, and ours, from the twin. `reached` is
+    whether ours is at least as good, None where the two are not comparable.
+    """
 
     what: str
     paper: str
     ours: str
-    better: bool | None = None
+    reached: bool | None = None
 
 
 @dataclass
@@ -392,9 +398,11 @@ def table(
     )
 
 
-def verdict(better: bool | None) -> tuple[str, str]:
+def verdict(reached: bool | None) -> tuple[str, str]:
     """The text and the class of a comparison."""
-    return ("", "") if better is None else ("better", "good") if better else ("worse", "bad")
+    if reached is None:
+        return ("", "")
+    return ("reached", "good") if reached else ("not reached", "bad")
 
 
 def move_rows(result: Result) -> Iterator[Sequence[Cell]]:
@@ -435,10 +443,10 @@ def page(result: Result) -> str:
         parts.insert(1, f'<p class="summary">{html.escape(result.summary)}</p>')
     if result.compared:
         rows: list[Sequence[Cell]] = [
-            (entry.what, entry.paper, entry.ours, verdict(entry.better))
+            (entry.what, entry.paper, entry.ours, verdict(entry.reached))
             for entry in result.compared
         ]
-        parts += ["<h2>Against the paper</h2>", table(("", "paper", "here", ""), rows)]
+        parts += ["<h2>Against the paper</h2>", table(AGAINST_THE_PAPER, rows)]
     parts.append("<h2>Pictures</h2>")
     for name, (caption, image) in pictures(result).items():
         source = "data:image/png;base64," + base64.b64encode(image).decode()

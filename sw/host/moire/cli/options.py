@@ -2,6 +2,7 @@
 """The options that every command takes, and one that several share."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import click
@@ -9,9 +10,19 @@ from click.core import ParameterSource
 
 from moire.bus.protocol import ADDRESSES
 from moire.bus.transport import BAUD, PARITIES
-from moire.cli.values import ADDRESS, AXIS, FILE, POSITIVE, TEXT, WAITING_TIME, Name
+from moire.cli.values import (
+    ADDRESS,
+    AXIS,
+    DURATION,
+    FILE,
+    POSITIVE,
+    TEXT,
+    WAITING_TIME,
+    Name,
+)
+from moire.client.bus import ANSWER_S
 
-OF_THE_PORT = ("port", "baud", "parity", "record")
+OF_THE_PORT = ("port", "baud", "parity", "patience", "record")
 OF_THE_CALL = (*OF_THE_PORT, "json")
 GIVEN = "moire.given"  # key in the meta data of a context
 
@@ -23,6 +34,7 @@ class Options:
     port: str | None = None
     baud: int = BAUD
     parity: str = "auto"
+    patience: Fraction | float = ANSWER_S  # s
     record: str | None = None
     address: int = 1
     axis: int = 0
@@ -64,6 +76,13 @@ COMMON = (
         help="How the port sends the 9th bit. 'auto' takes mark parity where the port has it. "
         "'odd' reaches only the addresses 1 2 4 7 8 11 13 14. 'none' sends COBS packets in 8N1, "
         "which 'auto' takes for socket:// and pseudo terminals.",
+    ),
+    Common(
+        "--patience",
+        metavar="TIME",
+        type=DURATION,
+        help="How long to wait for an answer of a node before the request is repeated. The default "
+        f"is {1000 * ANSWER_S:g}ms. A simulated machine on a busy computer may need 2s.",
     ),
     Common(
         "--record",

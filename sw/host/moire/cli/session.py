@@ -53,7 +53,7 @@ class Session:
             transport = self.open_transport(self.options)
             if self.options.record:
                 transport = ports.recorded(transport, self.options.record)
-            self.opened = Bus(transport)
+            self.opened = Bus(transport, answer_s=float(self.options.patience))
         return self.opened
 
     def carry_out(self, planned: Planned) -> None:
@@ -153,7 +153,7 @@ class Call:
 
     @property
     def watched(self) -> bool:
-        """Whether a person looks at the standard error."""
+        """Whether the standard error is a terminal."""
         return not self.options.json and self.session.err.isatty()
 
     def now(self) -> float:
@@ -184,11 +184,11 @@ class Call:
         self.say({**place, **values}, text)
 
     def overwrite(self, text: str) -> None:
-        """Replace the line that follows a motion, where a person looks at it."""
+        """Replace the line that follows a motion, where a person can see it."""
         print(f"\r{text:<{WIDTH}}", end="", file=self.session.err, flush=True)
 
     def progress(self) -> Callable[[Status], None] | None:
-        """A function that follows a motion on the screen; None where no person looks."""
+        """A function that follows a motion on the screen; None where no person can see it."""
         if not self.watched:
             return None
 

@@ -335,7 +335,7 @@ class Axis(AxisParameters, AxisCapture):
         distance: units.Value = "1mm",
         timeout: units.Value = "120s",
     ) -> CalibrationState:
-        """Learns the correction from scratch, then freezes it.
+        """Calibrates the correction from scratch, then freezes it.
 
         The axis must be enabled and homed. It moves over `distance` (nm, or a text) at several
         speeds, to the side where the travel has room, until the correction is settled, and comes

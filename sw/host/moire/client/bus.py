@@ -42,6 +42,7 @@ RATES = (
     19_200,
     9_600,
 )
+ANSWER_S = 0.1  # patience with a node, unless a Bus is given another time
 POLL_S = 0.05  # between two polls of a motion, unless a Bus is given another time
 
 
@@ -60,7 +61,7 @@ class Bus:
         self,
         transport: Transport,
         tries: int = 5,
-        answer_s: float = 0.1,
+        answer_s: float = ANSWER_S,
         random_source: random.Random | None = None,
         poll_s: float = POLL_S,
     ):

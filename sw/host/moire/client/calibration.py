@@ -63,7 +63,7 @@ def calibrate(
             if axis.transport.now() > end:
                 raise NotCalibrated(
                     state.reason,
-                    f"axis {axis.number} of node {axis.node.address} learned no correction within "
+                    f"axis {axis.number} of node {axis.node.address} found no correction within "
                     f"{units.format_time(patience)}: {state.words} ({state.accepted} accepted, "
                     f"{state.refused} refused)",
                 )

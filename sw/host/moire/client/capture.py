@@ -25,7 +25,7 @@ POINTS = range(1 << 32)
 
 
 class AxisCapture(AxisAccess):
-    """The part of an axis that captures positions, and puts out pulses at positions."""
+    """The part of an axis that captures positions, and sends pulses at positions."""
 
     def capture_from(self, *sources: str) -> None:
         """Selects the events that capture the position; none: captures nothing from now on.

@@ -8,6 +8,7 @@ from typing import Protocol
 from moire import units
 from moire.client.access import AxisAccess
 from moire.client.values import (
+    CHOICES,
     FILTER,
     FILTERS,
     ParameterValue,
@@ -21,6 +22,10 @@ from moire.made.bus_tables import PARAMETERS
 
 TRAVEL = ("travel_low", "travel_high")
 GAINS = ("kp", "ki", "kd", "kv", "ka")
+# the node refuses this value of the first together with another than 0 of the second
+EXCLUSIVE = (("position_source", "own_steps", "step_output"), ("drive", "dac", "fine_reach"))
+# while one of these is on, the node refuses values of others: they are switched off first
+OFF_FIRST = ("step_output", "fine_reach", "segments")
 
 
 class Tuning(Protocol):
@@ -80,9 +85,7 @@ class AxisParameters(AxisAccess):
         UnknownName, OutOfRange, or Refused.
         """
         counts = self.parameter_counts(name, value)
-        if name in TRAVEL:
-            limits = {limit: self.get_parameter(limit).counts for limit in TRAVEL}
-            self.check_travel({**limits, name: counts})
+        self.check_together({name: counts})
         return self.write_parameter(name, counts)
 
     def write_parameter(self, name: str, counts: int) -> ParameterValue:
@@ -96,13 +99,32 @@ class AxisParameters(AxisAccess):
             self.period_nm = self.read_period()
         return self.parameter_value(name, counts)
 
-    def check_travel(self, counts: Mapping[str, int], period_nm: Fraction | None = None) -> None:
-        """Raises OutOfRange when the upper end of the travel lies below the lower end."""
-        if counts["travel_high"] < counts["travel_low"]:
-            low, high = (
-                self.parameter_value(name, counts[name], period_nm).written(9) for name in TRAVEL
+    def check_together(self, counts: Mapping[str, int], period_nm: Fraction | None = None) -> None:
+        """Raises OutOfRange when these counts do not go together.
+
+        A partner that is not among them is read from the node.
+        """
+
+        def pair(first: str, second: str) -> tuple[ParameterValue, ParameterValue] | None:
+            if first not in counts and second not in counts:
+                return None
+            one, other = (
+                self.parameter_value(name, counts[name], period_nm)
+                if name in counts
+                else self.get_parameter(name)
+                for name in (first, second)
             )
+            return one, other
+
+        if (travel := pair(*TRAVEL)) and travel[1].counts < travel[0].counts:
+            low, high = (value.written(9) for value in travel)
             raise OutOfRange(f"travel_high ({high}) would lie below travel_low ({low})")
+        for first, choice, second in EXCLUSIVE:
+            found = pair(first, second)
+            if found and found[0].counts == CHOICES[first].index(choice) and found[1].counts:
+                raise OutOfRange(
+                    f"{first} {choice} and {second} {found[1].written(6)} do not go together"
+                )
 
     def parameters(self) -> dict[str, ParameterValue]:
         """All parameters, by name."""
@@ -115,8 +137,7 @@ class AxisParameters(AxisAccess):
     def load_parameters(self, texts: Mapping[str, units.Value]) -> dict[str, ParameterValue]:
         """Sets some or all parameters from the texts of save_parameters().
 
-        Every one is checked before the first is written. The period is written first, since
-        lengths depend on it.
+        Every one is checked before the first is written.
         """
         return {
             name: self.write_parameter(name, counts)
@@ -124,20 +145,23 @@ class AxisParameters(AxisAccess):
         }
 
     def check_parameters(self, texts: Mapping[str, units.Value]) -> dict[str, int]:
-        """The counts of some or all parameters, the period first, without writing any.
+        """The counts of some or all parameters in the order to write them, without writing any.
 
-        Raises OutOfRange or UnknownName when they cannot be loaded.
+        The period comes first, since lengths depend on it; then what is switched off and would
+        forbid others; then all others in the order of the protocol. Raises OutOfRange or
+        UnknownName when they cannot be loaded.
         """
         period_nm = self.period_nm
         if "period" in texts:
             period_nm = Fraction(self.parameter_counts("period", texts["period"]), 1000)
-        counts = {
-            name: self.parameter_counts(name, texts[name], period_nm)
-            for name in sorted(texts, key=lambda name: name != "period")
-        }
-        if all(name in counts for name in TRAVEL):
-            self.check_travel(counts, period_nm)
-        return counts
+        counts = {name: self.parameter_counts(name, texts[name], period_nm) for name in texts}
+        self.check_together(counts, period_nm)
+
+        def turn(name: str) -> tuple[bool, bool, int]:
+            off = name in OFF_FIRST and counts[name] == 0
+            return name != "period", not off, PARAMETERS[name].id
+
+        return {name: counts[name] for name in sorted(counts, key=turn)}
 
     def set_tuning(self, tuning: Tuning) -> None:
         """Sets the gains and filters that moire.analysis.tune made.

@@ -136,7 +136,7 @@ class Drive:
 class CalibrationState:
     """The progress of the sine/cosine auto-calibration."""
 
-    reason: str  # "learning", or the reason why nothing is learned just now
+    reason: str  # "calibrating", or the reason why the calibration refuses at present
     settled: bool  # offset, gain, quadrature error and harmonics are all known
     frozen: bool
     accepted: int  # measurements used since power-up

@@ -143,7 +143,7 @@ def packed(marker: int, settings: Settings, words: Iterable[int]) -> bytes:
 def make_set(terms: Terms, settings: Settings, orders: int) -> bytes:
     """The bytes of a set for a relay of so many orders; raises OutOfRange.
 
-    The relay puts out the position less the sum of amplitude * sin(order * angle + phase).
+    The relay sends the position less the sum of amplitude * sin(order * angle + phase).
     """
     check_range(orders, 1, MOST_ORDERS, "a number of orders")
     if len(terms) > orders:

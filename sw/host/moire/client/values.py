@@ -15,7 +15,7 @@ FILTER = ("b0", "b1", "b2", "a1", "a2")  # coefficients of a filter
 # names of the values of a parameter or setting that is a choice, from 0 on
 CHOICES = {
     "home_end": ("low", "high"),
-    "auto_calibration": ("frozen", "learns"),
+    "auto_calibration": ("frozen", "calibrates", "follows"),
     "decoder_mode": ("every_edge", "every_second", "every_fourth", "pulses"),
     "position_source": ("phases", "counts", "own_steps"),
     "drive": ("bridge", "steps", "dac"),

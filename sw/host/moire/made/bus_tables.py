@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x391503CD
+PROTOCOL_CRC = 0xFD44F463
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -197,9 +197,11 @@ SIGNAL_FAULTS = {
 # code: (name, words)
 CALIBRATION_ACTIONS = {
     0: ("read", "change nothing, only report"),
-    1: ("calibrate", "calibrate from now on"),
-    2: ("freeze", "stop the calibration; the correction stays in use"),
-    3: ("clear", "remove the correction and start again"),
+    1: ("calibrate", "calibrate during every motion from now on"),
+    2: ("freeze", "stop the calibration; the correction stays in force"),
+    3: ("clear",
+        "remove the correction: nothing is corrected any more, and a calibration starts again"),
+    4: ("follow", "follow the drift of offsets, gain and quadrature error from now on"),
 }
 
 # code: (name, words)
@@ -626,9 +628,9 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               "interlock: longest silence of the bus while a drive is on (all axes); 0: no "
               "limit, for a machine that runs without a host"),
     Parameter("auto_calibration", 33, "", Fraction(1, 1),
-              0, 1, 0,
+              0, 2, 0,
               "correction of sine and cosine: 0 frozen, 1 calibrates while the axis "
-              "moves", "RECORDER"),
+              "moves, 2 follows the drift of offsets, gain and quadrature error", "RECORDER"),
     Parameter("decoder_mode", 34, "", Fraction(1, 1),
               0, 3, 0,
               "decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulse and direction; "
@@ -680,7 +682,7 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               "signal: largest good amplitude times sine of the phase error; 65535 off", "MONITOR"),
     Parameter("position_source", 49, "", Fraction(1, 1),
               0, 2, 0,
-              "position from: 0 interpolated sine and cosine (needs SINE, else 1 is the "
+              "position from: 0 interpolated sine and cosine (needs HAS_SINE, else 1 is the "
               "default), 1 counts of A/B, 2 the steps that the axis sends"),
     Parameter("home_method", 50, "", Fraction(1, 1),
               -2, 37, -1,

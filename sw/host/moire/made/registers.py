@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x49D04E40  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xBBFAB873  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -107,6 +107,13 @@ FIELDS = (
         Fraction(1, 1),
         "axes that start, bit n: axis n; they play their queued segments from the same tick "
         "on",
+    ),
+    Field(
+        "node", "wait_time", "value",
+        0x28, 0, 24, False, "w", "cycle",
+        Fraction(1, 1),
+        "longest wait of the soft core; writing lets its next access to a register wait for "
+        "this time, or until a word of the bus is received",
     ),
     Field(
         "bus", "bit_time", "value",

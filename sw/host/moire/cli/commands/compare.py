@@ -13,7 +13,7 @@ from moire.cli.values import DURATION, LENGTH, POSITIVE
 
 group = Group(
     "compare",
-    help="Put out pulses at equidistant positions.",
+    help="Send pulses at equidistant positions.",
     example="moire --port twin home -- compare from 1mm 10um --count 50 -- move 2mm",
 )
 moire.add_command(group)
@@ -21,7 +21,7 @@ moire.add_command(group)
 
 @group.command(
     "from",
-    help="Put out pulses at START, START + STEP, START + 2 STEP and so on.",
+    help="Send pulses at START, START + STEP, START + 2 STEP and so on.",
     example="moire --port twin compare from 1mm 10um --pulse 2us",
 )
 @click.argument(
@@ -68,7 +68,7 @@ def compare_from(
 
 @group.command(
     "off",
-    help="Put out no more pulses.",
+    help="Send no more pulses.",
     example="moire --port twin compare off",
 )
 def compare_off(call: Call) -> None:

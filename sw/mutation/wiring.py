@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which connections of the block diagrams could be cut, inverted or swapped without a test that
+fails.
+
+python -m mutation.wiring [FILE …]      the mutants of these diagrams, or of all; see --help
+
+Each design of DESIGNS has tests in tb/wiring, which run on a build that contains all mutants of one
+diagram. A survivor is an error unless wiring.toml has its reason; a reason for a mutant that does
+not exist any more, or that a test finds, is an error as well.
+"""
+
+import argparse
+import fnmatch
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from mutation.connections import ROOT, RTL, Connection, diagrams, of_diagram
+from mutation.library import library
+from mutation.mutants import Design, Mutant
+
+REASONS = Path(__file__).with_name("wiring.toml")
+DESIGNS = {  # diagrams of a design; all others are in the node
+    "relay": ("relay.sv", "relay_bridge.sv"),
+    "peripherals": (
+        *("peripherals.sv", "i2c_port.sv", "ps2_port.sv", "ps2_pass.sv", "peer_port.sv"),
+        "angle_sensor_port.sv",
+    ),
+    "display_port": ("display_port.sv",),
+}
+ZERO = re.compile(r"(\d*'[bdh]?0+|0)")
+ONE = re.compile(r"(1'b1|1'd1)")
+
+
+def design_of(file: Path) -> str:
+    """The design in which a diagram is tested."""
+    return next((top for top, names in DESIGNS.items() if file.name in names), "node")
+
+
+@cache
+def reasons() -> dict[str, str]:
+    """{pattern of names of mutants: why no test can find them}."""
+    found: dict[str, str] = tomllib.loads(REASONS.read_text())
+    return found
+
+
+def constant(mutant: Mutant) -> bool:
+    """Whether the connection already is the constant that it is tied to."""
+    rule = {"tied to 0": ZERO, "tied to 1": ONE}.get(mutant.what)
+    return bool(rule and rule.fullmatch(mutant.connection.expression))
+
+
+@dataclass
+class Verdicts:
+    """What became of the mutants."""
+
+    killed: dict[str, str] = field(default_factory=dict)  # name: test
+    survivors: list[Mutant] = field(default_factory=list)
+    explained: dict[str, str] = field(default_factory=dict)  # name: pattern of its reason
+    stale: list[str] = field(default_factory=list)  # patterns that explain what a test finds
+    left: int = 0  # mutants that were not run
+
+    @property
+    def failures(self) -> int:
+        return len(self.survivors) + len(self.stale)
+
+    @property
+    def words(self) -> str:
+        return (
+            f"{len(self.killed)} found, {len(self.explained)} explained, "
+            f"{len(self.survivors)} survivors, {len(self.stale)} stale reasons, {self.left} not run"
+        )
+
+
+def pattern_of(name: str) -> str | None:
+    """The pattern in wiring.toml that fits a mutant."""
+    return next((p for p in reasons() if fnmatch.fnmatchcase(name, p)), None)
+
+
+def git(*words: str) -> bytes | None:
+    """What git says, None if it fails."""
+    said = subprocess.run(["git", *words], cwd=ROOT, capture_output=True)
+    return said.stdout if said.returncode == 0 else None
+
+
+def base() -> str | None:
+    """The commit with which the diagrams are compared: where the branch left main; on main itself
+    the commit before the last one. None without a history.
+    """
+    head, left = git("rev-parse", "HEAD"), git("merge-base", "HEAD", "main")
+    if left is None or left == head:
+        left = git("rev-parse", "HEAD~1")
+    return left.decode().strip() if left else None
+
+
+def key(connection: Connection) -> tuple[str, str, str]:
+    """What makes a connection the same in two versions of a file."""
+    expression = re.sub(r"\s+", "", connection.expression)
+    return connection.instance, connection.port, expression
+
+
+def changed() -> set[Connection]:
+    """The connections that differ from the base."""
+    found: set[Connection] = set()
+    commit = base()
+    if not commit or git("diff", "--quiet", commit, "--", "rtl") is not None:
+        return found
+    for file in diagrams():
+        old = git("show", f"{commit}:{file.relative_to(ROOT)}")
+        if old == file.read_bytes():
+            continue
+        before = set()
+        if old is not None:
+            with tempfile.TemporaryDirectory() as folder:
+                (Path(folder) / file.name).write_bytes(old)
+                before = {key(c) for c in of_diagram(Path(folder) / file.name)}
+        found |= {c for c in of_diagram(file) if key(c) not in before}
+    return found
+
+
+def campaign(
+    design: Design, mutants: Sequence[Mutant], top: str, jobs: int
+) -> Iterator[tuple[Mutant, str]]:
+    """Each mutant, and the test that finds it."""
+    words = [sys.executable, "-m", "tb.wiring.parameters", top]
+    said = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True)
+    values: Mapping[str, int] = tomllib.loads(said.stdout)
+    path = library(top, values, design)
+    by_name = {m.name: m for m in mutants}
+    lines = [
+        f"{m.name};{';'.join(map(str, m.selected))};{m.connection.instance}\n" for m in mutants
+    ]
+    command = [sys.executable, "-m", "tb.wiring.campaign", top, str(path), str(jobs)]
+    with subprocess.Popen(
+        command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin and process.stdout
+        process.stdin.writelines(lines)
+        process.stdin.close()
+        for line in process.stdout:
+            name, test = line.rstrip("\n").rsplit(";", 1)
+            yield by_name[name], test
+    if process.returncode:
+        raise RuntimeError(f"the campaign of {top} ended with {process.returncode}")
+
+
+def judge(verdicts: Verdicts, mutant: Mutant, test: str) -> None:
+    """Add the result of one mutant."""
+    pattern = pattern_of(mutant.name)
+    if test:
+        verdicts.killed[mutant.name] = test
+        if pattern:
+            verdicts.stale.append(f"{mutant.name}: {test} finds it, but it has a reason")
+    elif pattern:
+        verdicts.explained[mutant.name] = pattern
+    else:
+        verdicts.survivors.append(mutant)
+
+
+def run(
+    files: Iterable[Path],
+    chosen: Callable[[Connection], bool] = lambda c: True,
+    clocks: bool = False,
+    jobs: int = 2,
+    seconds: float = float("inf"),
+    report: bool = False,
+) -> Verdicts:
+    """Run the mutants of diagrams, one diagram after the other; none is begun after so many
+    seconds.
+    """
+    verdicts, end = Verdicts(), time.monotonic() + seconds
+    for file in files:
+        design = Design.of([file], clocks, chosen)
+        mutants = [m for m in design.mutants() if not constant(m)]
+        verdicts.left += len(mutants)
+        if not mutants or time.monotonic() > end:
+            continue
+        for mutant, test in campaign(design, mutants, design_of(file), jobs):
+            verdicts.left -= 1
+            judge(verdicts, mutant, test)
+            if report:
+                print(f"{mutant.name}: {test or 'NO TEST'}", file=sys.stderr, flush=True)
+            if not test and not pattern_of(mutant.name):
+                print(
+                    f"{mutant.place}: {mutant.name}: no test sees it", file=sys.stderr, flush=True
+                )
+            if time.monotonic() > end:
+                break
+    return verdicts
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m mutation.wiring")
+    parser.add_argument("files", nargs="*", help="diagrams below rtl/; default: all")
+    parser.add_argument("--list", action="store_true", help="print the mutants, run nothing")
+    parser.add_argument("--changed", action="store_true", help="connections that are new here")
+    parser.add_argument("--clocks", action="store_true", help="the clocks in place of all others")
+    parser.add_argument("-j", type=int, default=2, metavar="JOBS")
+    parser.add_argument("-k", default="", metavar="PART", help="connections with this in the name")
+    options = parser.parse_args(arguments)
+    files = [RTL / name for name in options.files] or list(diagrams())
+    new = changed() if options.changed else None
+
+    def chosen(connection: Connection) -> bool:
+        return options.k in connection.name and (new is None or connection in new)
+
+    if options.list:
+        for mutant in Design.of(files, options.clocks, chosen).mutants():
+            print(f"{mutant.place}: {mutant.name}")
+        return 0
+    verdicts = run(files, chosen, options.clocks, options.j, report=True)
+    print(verdicts.words)
+    print(*verdicts.stale, sep="\n", end="")
+    return int(verdicts.failures > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The netlist that Yosys makes of a module for a family of FPGAs, as sources of a simulation.
+
+The primitives are Yosys's own models (its folder share), without the timing that Icarus does not
+read. Yosys has no model of two primitives of the ECP5: dp16kd.vh and mult18x18d.vh are ours. A
+wrapper has the name, the ports and the parameters of the module, so that a test sees no difference,
+as long as it uses ports only. All of it is kept under build/netlist by the contents of everything
+that goes in.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+BODIES = HERE / "primitives"
+ROOT = HERE.parents[1]
+BUILD = ROOT / "build" / "netlist"
+FAMILIES = ("ecp5", "ice40")
+SUFFIX = "_netlist"  # of the module that Yosys has made, below its wrapper
+TIMING = re.compile(r"^[ \t]*specify\b.*?^[ \t]*endspecify\b", re.MULTILINE | re.DOTALL)
+OURS = {"DP16KD": "dp16kd.vh", "MULT18X18D": "mult18x18d.vh"}
+BUSES = {  # of their ports of one bit each
+    "DP16KD": {"ADA": 14, "ADB": 14, "DIA": 18, "DIB": 18, "DOA": 18, "DOB": 18},
+    "MULT18X18D": {"A": 18, "B": 18, "P": 36},
+}
+
+
+Parameters = Mapping[str, int | str]
+
+
+class NetlistError(Exception):
+    """One line that says why there is no netlist."""
+
+
+def share() -> Path:
+    """Yosys's folder of models and maps."""
+    found = find_spec("pyosys")
+    if not found or not found.submodule_search_locations:
+        raise NetlistError("the package pyosys is missing")
+    return Path(found.submodule_search_locations[0]) / "share"
+
+
+def module_of(text: str, name: str) -> str:
+    """A module, without its end."""
+    found = re.search(rf"^module {name}\b.*?^(?=endmodule)", text, re.MULTILINE | re.DOTALL)
+    if not found:
+        raise NetlistError(f"Yosys has no module {name}")
+    return found[0]
+
+
+def rows() -> str:
+    """The initial contents of a DP16KD: 64 parameters of 16 words of 18 bits, 20 bits apart."""
+    return "\n".join(
+        f"for (n = 0; n < 8; n = n + 1) rows[{8 * n} + n] = "
+        f"{{INITVAL_{n:02X}[40*n+20+:18], INITVAL_{n:02X}[40*n+:18]}};"
+        for n in range(64)
+    )
+
+
+def filled(name: str, body: str) -> str:
+    """Our body of a primitive, with the buses that its ports of one bit form."""
+    for bus, width in BUSES[name].items():
+        bits = ", ".join(f"{bus}{bit}" for bit in reversed(range(width)))
+        body = body.replace(f"`{bus}_BITS", f"{{{bits}}}")
+    return body.replace("`ROWS", rows())
+
+
+def primitives_ecp5() -> str:
+    folder = share() / "ecp5"
+    text = "".join(
+        (folder / name).read_text() for name in ("common_sim.vh", "ccu2c_sim.vh", "cells_sim.v")
+    )
+    text = re.sub(r"^`include.*$", "", text, flags=re.MULTILINE)
+    # a cell of a placed design, which Icarus does not read, and which Yosys does not make
+    text = text.replace(f"{module_of(text, 'TRELLIS_COMB')}endmodule", "")
+    boxes = text + (folder / "cells_bb.v").read_text()
+    ours = {name: module_of(boxes, name) for name in OURS}
+    text = text.replace(f"(* blackbox *)\n{ours['DP16KD']}endmodule", "")
+    for name, file in OURS.items():
+        text += f"\n{ours[name]}{filled(name, (BODIES / file).read_text())}endmodule\n"
+    return text
+
+
+def primitives_ice40() -> str:
+    text = (share() / "ice40" / "cells_sim.v").read_text()
+    return f"`define NO_ICE40_DEFAULT_ASSIGNMENTS\n{text}"
+
+
+def primitives(family: str) -> str:
+    """The models of a family's primitives, as the text of one file."""
+    text = primitives_ecp5() if family == "ecp5" else primitives_ice40()
+    return f"`default_nettype wire\n`timescale 1ns/1ps\n{TIMING.sub('', text)}".replace(
+        "`timescale 1ps / 1ps", ""
+    )
+
+
+def literal(value: int | str) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(int(value))
+
+
+def parts(source: Path, folders: Sequence[Path]) -> dict[Path, str]:
+    """The source and, below it, every file of these folders whose module it names."""
+    known = {path.stem: path for d in folders for path in sorted(d.glob("*.*v"))}
+    found: dict[Path, str] = {}
+    left = [source]
+    while left:
+        path = left.pop()
+        if path not in found:
+            found[path] = path.read_text()
+            left += [known[word] for word in set(re.findall(r"\w+", found[path])) & known.keys()]
+    return found
+
+
+def digest(family: str, source: Path, parameters: Parameters, folders: Sequence[Path]) -> str:
+    """A name for everything that the netlist depends on."""
+    total = hashlib.sha256(repr((family, source.stem, sorted(parameters.items()))).encode())
+    total.update(version("pyosys").encode())
+    for path in (*sorted(BODIES.glob("*.vh")), Path(__file__), ROOT / "tools" / "yosys.py"):
+        total.update(path.read_bytes())
+    for path, text in sorted(parts(source, folders).items()):
+        total.update(path.name.encode() + text.encode())
+    for value in parameters.values():
+        if isinstance(value, str) and (ROOT / value).is_file():
+            total.update((ROOT / value).read_bytes())
+    return total.hexdigest()[:16]
+
+
+def value_of(bits: str) -> str:
+    """A parameter's value in Yosys's JSON, as Verilog."""
+    if re.fullmatch(r"[01xz]+", bits):
+        number = int(re.sub("[xz]", "0", bits), 2)
+        return str(number - 2**32 if len(bits) == 32 and number >= 2**31 else number)
+    return f'"{bits.rstrip()}"'
+
+
+def wrapper(top: str, module: dict[str, Any]) -> str:
+    """A module of the netlist's name, ports and parameters, around the netlist."""
+    parameters = module.get("parameter_default_values", {})
+    listed = ",\n".join(f"    parameter {p} = {value_of(v)}" for p, v in parameters.items())
+    ports = module["ports"]
+    declared = ",\n".join(
+        f"    {port['direction']} wire {'signed ' if port.get('signed') else ''}"
+        f"[{len(port['bits']) - 1}:0] {name}"
+        if len(port["bits"]) > 1
+        else f"    {port['direction']} wire {name}"
+        for name, port in ports.items()
+    )
+    joined = ",\n".join(f"        .{name}({name})" for name in ports)
+    head = f"module {top} #(\n{listed}\n) (" if parameters else f"module {top} ("
+    return f"{head}\n{declared}\n);\n    {top}{SUFFIX} u_netlist (\n{joined}\n    );\nendmodule\n"
+
+
+def synthesise(
+    family: str, source: Path, parameters: Parameters, folders: Sequence[Path], out: Path
+) -> None:
+    """Yosys writes netlist.v and the interface of the module into the folder `out`."""
+    top = source.stem
+    change = "".join(f" -set {name} {literal(value)}" for name, value in parameters.items())
+    passes = [
+        f"read_verilog -sv {source}",
+        f"chparam{change} {top}" if change else "",
+        f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
+        "design -save elaborated; proc",
+        f"write_json {out}/interface.json",
+        f"design -load elaborated; synth_{family} -top {top}",
+        f"check -assert; rename {top} {top}{SUFFIX}",
+        f"write_verilog -noattr {out}/netlist.v",
+    ]
+    command = [sys.executable, str(ROOT / "tools" / "yosys.py"), "; ".join(passes)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    (out / "synthesis.log").write_text(done.stdout + done.stderr)
+    if done.returncode:
+        lines = (done.stdout + done.stderr).splitlines()
+        errors = [line for line in lines if "ERROR" in line] or lines[-1:]
+        raise NetlistError(f"synth_{family} of {top}: {errors[-1] if errors else 'no word'}")
+    module = json.loads((out / "interface.json").read_text())["modules"][top]
+    (out / "wrapper.v").write_text(wrapper(top, module))
+    (out / "primitives.v").write_text(primitives(family))
+    (out / "interface.json").unlink()
+
+
+def sources(
+    family: str, source: Path, parameters: Parameters, folders: Sequence[Path]
+) -> list[Path]:
+    """[primitives, netlist, wrapper] of a module with these parameters: what a simulation compiles
+    in place of its RTL.
+    """
+    if family not in FAMILIES:
+        raise NetlistError(f"NETLIST={family}: it is one of {', '.join(FAMILIES)}")
+    tag = digest(family, source, parameters, folders)
+    folder = BUILD / family / f"{source.stem}-{tag}"
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with open(BUILD / f"{family}-{source.stem}-{tag}.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not folder.exists():
+            folder.parent.mkdir(exist_ok=True)
+            making = Path(tempfile.mkdtemp(dir=BUILD, prefix="making-"))
+            try:
+                synthesise(family, source, parameters, folders, making)
+                os.rename(making, folder)
+            finally:
+                shutil.rmtree(making, ignore_errors=True)
+    return [folder / name for name in ("primitives.v", "netlist.v", "wrapper.v")]

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""core_wait: the exact times, an event before and during the wait, and random levels against the
+model in every cycle.
+"""
+
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from tb.bench import run, start
+from tb.cpu.core_wait import CoreWait
+
+
+async def cycle(dut, **inputs):
+    for name, level in (dict(start=0, cycles=0, wake=0, rst=0) | inputs).items():
+        getattr(dut, name).value = level
+    await RisingEdge(dut.clk)
+    await FallingEdge(dut.clk)
+    return int(dut.waits.value)
+
+
+async def begin(dut):
+    await start(dut, start=0, cycles=0, wake=0)
+    await cycle(dut, rst=1)
+
+
+@cocotb.test()
+async def latency_is_1_cycle_and_the_wait_lasts_as_many_cycles_as_are_set(dut):
+    await begin(dut)
+    for cycles in (1, 2, 3, 200):
+        assert await cycle(dut, start=1, cycles=cycles)
+        assert [await cycle(dut) for _ in range(cycles + 5)] == [1] * (cycles - 1) + [0] * 6
+
+
+@cocotb.test()
+async def an_event_ends_the_wait_after_1_cycle(dut):
+    await begin(dut)
+    assert await cycle(dut, start=1, cycles=200)
+    assert all([await cycle(dut) for _ in range(20)])
+    assert not await cycle(dut, wake=1)
+    assert not any([await cycle(dut) for _ in range(250)])
+
+
+@cocotb.test()
+async def no_wait_begins_while_there_is_something_to_do_nor_for_0_cycles(dut):
+    await begin(dut)
+    for inputs in (dict(cycles=200, wake=1), dict(cycles=0)):
+        assert not await cycle(dut, start=1, **inputs)
+        assert not any([await cycle(dut) for _ in range(250)])
+
+
+@cocotb.test()
+async def random_levels_match_the_model(dut):
+    await begin(dut)
+    model, most = CoreWait(), (1 << int(dut.W.value)) - 1
+    for n in range(5000):
+        inputs = dict(
+            start=int(random.random() < 0.1),
+            cycles=random.choice([0, 1, 2, random.randrange(30), random.randint(0, most)]),
+            wake=int(random.random() < 0.05),
+            rst=int(random.random() < 0.01),
+        )
+        assert await cycle(dut, **inputs) == model.step(**inputs), f"cycle {n}"
+
+
+@pytest.mark.parametrize("w", [8, 24])
+def test_core_wait(w):
+    run("core_wait", __file__, W=w)

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figures of the netlists count what fails, and refuse to count nothing."""
+
+import pytest
+
+from figures import netlist as figures_netlist
+from figures.synthesis import SynthesisError
+
+PROBE = """
+import os
+import pytest
+
+def test_right():
+    assert os.environ["PROBE"] == "set"
+
+def test_wrong():
+    assert os.environ["PROBE"] != "set"
+
+def test_left_out():
+    pytest.skip("for a reason")
+"""
+
+
+def test_failures_are_counted_and_a_run_without_tests_is_an_error(tmp_path):
+    probe = tmp_path / "test_probe.py"
+    probe.write_text(PROBE)
+    assert figures_netlist.failed(str(probe), "", {"PROBE": "set"}) == (2, 1)
+    with pytest.raises(SynthesisError, match="no test of .* ran"):
+        figures_netlist.failed(str(probe), "left_out", {})
+
+
+def test_two_builds_are_compared_with_the_reference(tmp_path, monkeypatch):
+    assert figures_netlist.builds_differing(place=False) == 0
+    reference = tmp_path / "reference"
+    reference.write_text(f"{'0' * 64} netlist\n")
+    monkeypatch.setattr(figures_netlist, "REFERENCE", reference)
+    monkeypatch.setattr(figures_netlist, "built", lambda folder, place, **_: "0" * 63 + folder.name)
+    assert figures_netlist.builds_differing(place=False) == 2

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the wiring take."""
+
+import pytest
+
+from tb.wiring.display_port import DisplayPort
+from tb.wiring.node import Node
+from tb.wiring.peripherals import Peripherals
+from tb.wiring.relay import Relay
+
+
+@pytest.fixture
+def node():
+    """A node after its reset."""
+    made = Node()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def peripherals():
+    """The peripherals after their reset."""
+    made = Peripherals()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def relay():
+    """The relay before its reset."""
+    made = Relay()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def display_port():
+    """The port of the display after its reset."""
+    made = DisplayPort()
+    yield made
+    made.close()

@@ -1,0 +1,486 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The wires of time, registers and motion engine in a node: ticks, profiles, starts, servo, and the
+drives that follow them.
+"""
+
+import pytest
+
+from tb.wiring.node import CLK_HZ, COUNT, REGISTERS, TICK
+
+FULL = 1 << 15
+
+
+def other(axis):
+    return 1 - axis
+
+
+def play(node, axis, velocity, ticks):
+    node.segment(axis, velocity, ticks)
+    node.write("axis.strobes", start=1, axis=axis)
+
+
+def test_the_node_reports_what_it_is(node):
+    build = node.fields("node.build")
+    assert build == {"axes": 3, "address": 5, "memory": 4}
+    assert node.read("node.clk_hz") == CLK_HZ
+    first = node.now, node.read("node.time_stamp")
+    node.run(1000)
+    second = node.now, node.read("node.time_stamp")
+    apart = second[1] - first[1] - (second[0] - first[0])
+    assert abs(apart) < 100, "it counts cycles"
+
+
+def test_each_axis_reports_what_it_is_built_with(node):
+    full = dict.fromkeys(node.fields("axis.built"), 1) | {"filters": 2, "segments": 255}
+    assert node.fields("axis.built", 0) == full
+    assert node.fields("axis.built", 1) == full | {"capture": 0}
+    assert node.fields("axis.built", 2) == dict.fromkeys(full, 0)
+
+
+def test_settings_read_back_in_each_block(node):
+    settings = {
+        "node.tick_period": 123456,
+        "bus.watchdog_time": 4321,
+        "peripherals.edm_filter": 77,
+    }
+    of_axes = {"axis.kp": 0x123456, "feedback.compare_count": 99, "actuator.pwm_period": 345}
+    for name, value in settings.items():
+        node.write(name, value)
+    for axis in (0, 1):
+        for name, value in of_axes.items():
+            node.write(name, value + axis, axis=axis)
+    for name, value in settings.items():
+        assert node.read(name) == value
+    for axis in (0, 1):
+        for name, value in of_axes.items():
+            assert node.read(name, axis=axis) == value + axis
+    assert node.read("axis.kp", axis=2) == 0, "it has no servo"
+    assert ("axis", "kp") in REGISTERS
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_profile_moves_the_target_of_its_axis_at_the_ticks(node, axis):
+    node.start()
+    node.enable(axis)
+    assert node.read("axis.state", "queue_free", axis) == 16
+    node.segment(axis, 3000, 6, last=False)
+    node.segment(axis, -1000, 4)
+    assert node.read("axis.state", "queue_free", axis) == 14
+    node.write("axis.strobes", start=1, axis=axis)
+    node.ticks(4)
+    assert "moving" in node.bits("axis.state", axis)
+    assert "moving" not in node.bits("axis.state", other(axis))
+    assert 0 < node.read("axis.target", axis=axis) < 18000
+    node.ticks(9)
+    assert node.read("axis.target", axis=axis) == 6 * 3000 - 4 * 1000
+    assert "moving" not in node.bits("axis.state", axis)
+    assert node.read("axis.target", axis=other(axis)) == 0
+    assert not node.bits("axis.faults", axis)
+
+
+def test_the_profiles_of_two_axes_start_at_the_same_tick_by_one_write(node):
+    node.start()
+    for axis in (0, 1):
+        node.segment(axis, 3000 + axis, 40)
+    node.write("node.start_axes", 2)
+    node.ticks(5)
+    assert node.read("axis.target", axis=0) == 0 < node.read("axis.target", axis=1)
+    node.write("node.start_axes", 1)
+    node.ticks(3)
+    assert node.read("axis.target", axis=0) > 0
+
+
+def test_a_start_of_several_axes_begins_a_tick(node):
+    """The tick is restarted, so that motions of several nodes begin together."""
+    node.write("actuator.dac", half_period=1, refresh=0xFFFF)
+    node.start()
+    node.write("feedback.capture_sources", 2)
+    node.write("feedback.strobes", capture_clear=1)
+    node.ticks(2)
+    node.run(TICK // 2)
+    node.write("node.start_axes", 1)
+    node.run(10)
+    node.write("feedback.strobes", capture_clear=1)
+    at = node.now
+    node.ticks(3)
+    times = []
+    for _ in range(2):
+        times.append(node.read("feedback.captured_time"))
+        node.write("feedback.strobes", capture_next=1)
+    assert times[1] - times[0] == TICK
+    assert (times[0] - at) % (1 << 32) < TICK - 10
+    assert (times[0] - at) % (1 << 32) > TICK - 600
+
+
+def test_a_sync_pulse_starts_the_axes_that_wait_for_it(node):
+    node.start()
+    node.write("bus.bit_time", 256)
+    for axis in (0, 1):
+        node.segment(axis, 3000, 40)
+    node.write("bus.sync_axes", 2)
+    node.send_sync()
+    node.ticks(4)
+    assert node.read("axis.target", axis=0) == 0 < node.read("axis.target", axis=1)
+    assert node.read("bus.syncs") == 1
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_an_armed_profile_starts_at_its_time(node, axis):
+    node.start()
+    node.segment(axis, 3000, 40)
+    node.write("axis.start_at", node.read("node.time_stamp") + 10 * TICK, axis=axis)
+    node.write("axis.strobes", arm=1, axis=axis)
+    node.ticks(7)
+    assert "armed" in node.bits("axis.state", axis)
+    assert node.read("axis.target", axis=axis) == 0
+    node.ticks(6)
+    assert "armed" not in node.bits("axis.state", axis)
+    assert node.read("axis.target", axis=axis) > 0
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_controlled_stop_ends_a_profile(node, axis):
+    node.start()
+    play(node, axis, 3000, 1000)
+    node.ticks(6)
+    node.write("axis.strobes", controlled_stop=1, axis=axis)
+    node.ticks(8)
+    stopped = node.read("axis.target", axis=axis)
+    node.ticks(4)
+    assert 0 < stopped == node.read("axis.target", axis=axis)
+    assert "moving" not in node.bits("axis.state", axis)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_target_takes_the_position_and_follows_a_shift_of_the_origin(node, axis):
+    node.start()
+    node.count(axis, 9)
+    node.count(other(axis), -2)
+    node.write("axis.strobes", set_target_to_position=1, axis=axis)
+    node.ticks(3)
+    assert node.read("axis.target", axis=axis) == 9 * COUNT
+    assert node.read("axis.position", axis=axis) == 9 * COUNT
+    assert node.read("axis.following_error", axis=axis) == 0
+    assert node.read("axis.following_error", axis=other(axis)) == 2 * COUNT
+    node.write("axis.shift_origin", -5, axis=axis)
+    node.ticks(3)
+    for register in ("axis.target", "axis.position"):
+        assert node.read(register, axis=axis) == 9 * COUNT - (5 << 16)
+        assert node.read(register, axis=other(axis)) == (0 if "target" in register else -2 * COUNT)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_velocity_is_measured_and_has_its_sign(node, axis):
+    node.start()
+    for sign in (1, -1):
+        for _ in range(4):
+            node.count(axis, sign * 10, TICK // 10)
+        assert node.read("axis.velocity", axis=axis) == pytest.approx(sign * 10 * COUNT, rel=0.15)
+        assert abs(node.read("axis.velocity", axis=other(axis))) < COUNT
+        node.ticks(3)
+
+
+def test_the_velocity_between_two_steps_has_the_sign_of_the_steps(node):
+    """A slow motion is measured by the time between two steps, and their sign."""
+    node.start()
+    for axis in (0, 1):
+        node.write("feedback.velocity_quantum", COUNT, axis=axis)
+    for axis in (0, 1):
+        for sign in (1, -1):
+            for _ in range(6):
+                node.count(axis, sign, 2 * TICK)
+            expected = sign * COUNT / 2
+            assert node.read("axis.velocity", axis=axis) == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_servo_answers_an_error_with_the_gains_of_its_axis(node, axis):
+    node.start()
+    node.write("axis.kp", 1000, axis=axis)
+    node.write("axis.strobes", set_target_to_position=1, axis=axis)
+    node.enable(axis, closed_loop=1)
+    node.ticks(2)
+    node.count(axis, -4)
+    node.ticks(3)
+    assert node.read("axis.command", axis=axis) == 1000 * 4 * COUNT >> 16
+    assert node.read("axis.command", axis=other(axis)) == 0
+    assert "saturated" not in node.bits("axis.state", axis)
+    node.write("axis.output_limit", 700, axis=axis)
+    node.ticks(3)
+    assert node.read("axis.command", axis=axis) == 700
+    assert "saturated" in node.bits("axis.state", axis)
+    assert "saturated" not in node.bits("axis.state", other(axis))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_filters_of_an_axis_act_on_its_command(node, axis):
+    node.start()
+    node.write("axis.kp", 1000, axis=axis)
+    node.write("axis.strobes", set_target_to_position=1, axis=axis)
+    node.enable(axis, closed_loop=1)
+    node.count(axis, -4)
+    for number, filter in enumerate((0.5, 0.25)):
+        node.write("axis.filter_address", 8 * number, axis=axis)
+        node.write("axis.filter_value", int(filter * 2**30), axis=axis)
+        node.write("axis.filter_address", 8 * number + 5, axis=axis)
+        node.write("axis.filter_value", 1, axis=axis)
+    node.ticks(4)
+    assert node.read("axis.command", axis=axis) == 1000 >> 3
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_bridge_drives_by_the_command_of_its_axis(node, axis):
+    node.start()
+    node.enable(axis)
+    for sign in (1, -1):
+        node.write("axis.open_command", sign * FULL // 4, axis=axis)
+        node.ticks(3)
+        node.watch("bridge_a", "bridge_b")
+        node.run(20 * 200)
+        changes = node.changes()
+        moving, still = ("bridge_a", "bridge_b") if sign > 0 else ("bridge_b", "bridge_a")
+        off = [c for c in changes if c.pin == still and not c.value >> axis & 1]
+        on = [c for c in changes if c.pin == still and c.value >> axis & 1]
+        assert not [c for c in changes if c.pin == moving]
+        assert node.get(moving) == 1 << axis and abs(len(off) - 20) <= 1
+        lengths = {
+            b.cycle - a.cycle for a, b in zip(off, [c for c in on if c.cycle > off[0].cycle])
+        }
+        assert lengths <= {49, 50, 51}
+    node.write("axis.control", 0, axis=axis)
+    node.run(8)
+    assert node.levels("bridge_a", "bridge_b") == (0, 0)
+
+
+def test_the_period_of_a_bridge_is_its_setting(node):
+    node.start()
+    node.enable(0)
+    node.write("actuator.pwm_period", 100)
+    node.write("axis.open_command", FULL // 2)
+    node.ticks(3)
+    node.watch("bridge_b")
+    node.run(1000)
+    falls = [c.cycle for c in node.changes() if not c.value]
+    assert {b - a for a, b in zip(falls, falls[1:])} == {100}
+
+
+def steps_of(node, axis, name="step"):
+    return [c.cycle for c in node.changes() if c.pin == name and c.value >> axis & 1]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_stepper_makes_the_steps_of_its_target(node, axis):
+    node.start()
+    node.write("actuator.drive", 1, axis=axis)
+    node.write("actuator.step_ratio", 40 << 32, axis=axis)
+    node.enable(axis)
+    node.ticks(3)
+    assert node.read("actuator.steps", axis=axis) == 0
+    total = 0
+    for sign in (1, -1):
+        node.watch("step", "direction")
+        play(node, axis, sign * 0x4000, 4)
+        node.ticks(10)
+        changes = node.changes()
+        rises = [c for c in changes if c.pin == "step" and c.value >> axis & 1]
+        assert len(rises) == 40
+        assert not [c for c in changes if c.value >> other(axis) & 1]
+        assert node.get("direction") >> axis & 1 == (sign > 0)
+        total += 40 * sign
+        assert node.read("actuator.steps", axis=axis) == total
+        falls = [c for c in changes if c.pin == "step" and not c.value >> axis & 1]
+        assert {b.cycle - a.cycle for a, b in zip(rises, falls)} == {10}
+    assert not node.bits("axis.faults", axis)
+
+
+def test_the_times_and_levels_of_steps_are_the_settings(node):
+    node.start()
+    node.write("actuator.drive", 1)
+    node.write("actuator.step_ratio", 400 << 32)
+    node.write("actuator.step_pulse", high=23, low=31)
+    node.write("actuator.step_direction", setup=47, hold=59)
+    node.write("actuator.step_output", step_low=1, direction_low=1)
+    node.run(80)
+    assert node.get("step") & 1 == 1
+    node.enable(0)
+    node.ticks(3)
+    node.watch("step", "direction")
+    node.segment(0, 0x4000, 2, last=False)
+    node.segment(0, -0x4000, 2)
+    node.write("axis.strobes", start=1)
+    node.ticks(12)
+    changes = [(c.cycle, c.pin, c.value & 1) for c in node.changes()]
+    turn = [c for c in changes if c[1] == "direction"]
+    assert turn
+    steps = [c for c in changes if c[1] == "step"]
+    pulses = list(zip(steps[::2], steps[1::2]))
+    assert {on[2] for on, _ in pulses} == {0}, "active low"
+    assert {off[0] - on[0] for on, off in pulses} == {23}
+    gaps = [b[0] - a[0] for (_, a), (b, _) in zip(pulses, pulses[1:])]
+    assert min(gaps) >= 31 and 31 in gaps or min(gaps) > 31
+    last_turn = turn[-1]
+    before = [off for _, off in pulses if off[0] <= last_turn[0]]
+    after = [on for on, _ in pulses if on[0] >= last_turn[0]]
+    if before:
+        assert last_turn[0] - before[-1][0] == 59
+    assert after[0][0] - last_turn[0] >= 47
+    assert last_turn[2] == 1, "down is high"
+
+
+def test_quadrature_steps_change_both_pins(node):
+    node.start()
+    node.write("actuator.drive", 1)
+    node.write("actuator.step_ratio", 40 << 32)
+    node.write("actuator.step_output", mode=1)
+    node.enable(0)
+    node.ticks(3)
+    node.watch("step", "direction")
+    play(node, 0, 0x4000, 4)
+    node.ticks(10)
+    changes = [c.pin for c in node.changes()]
+    assert changes == ["step", "direction"] * 20
+
+
+def test_a_pressed_switch_stops_the_steps_into_it(node):
+    node.start()
+    for axis, (sign, pin) in enumerate(((1, "limit_high_open"), (-1, "limit_low_open"))):
+        node.write("actuator.drive", 1, axis=axis)
+        node.write("actuator.step_ratio", 40 << 32, axis=axis)
+        node.enable(axis, homing=1)
+        node.ticks(3)
+        play(node, axis, sign * 0x2000, 4)
+        node.ticks(8)
+        assert node.read("actuator.steps", axis=axis) == sign * 20
+        node.set_bit(pin, axis, 1)
+        node.run(640)
+        play(node, axis, sign * 0x2000, 4)
+        node.ticks(8)
+        assert node.read("actuator.steps", axis=axis) == sign * 20, "blocked"
+        play(node, axis, -sign * 0x2000, 4)
+        node.ticks(8)
+        assert node.read("actuator.steps", axis=axis) != sign * 20
+        node.set_bit(pin, axis, 0)
+
+
+def test_own_steps_are_the_position_of_a_stepper_without_a_scale(node):
+    node.start()
+    for axis in (0, 1):
+        node.write("feedback.decoder_mode", 3, axis=axis)
+        node.write("feedback.position_source", counts=1, steps=1, axis=axis)
+        node.write("actuator.drive", 1, axis=axis)
+        node.write("actuator.step_ratio", 4 << 32, axis=axis)
+        node.enable(axis)
+        node.ticks(3)
+        for sign, expected in ((1, 4), (-1, 0), (-1, -4)):
+            play(node, axis, sign * 0x4000, 4)
+            node.ticks(10)
+            assert node.read("actuator.steps", axis=axis) == expected
+            assert node.read("axis.position", axis=axis) == expected * COUNT
+
+
+def words(node, axis, names=("dac_cs_n", "dac_sclk", "dac_sdi")):
+    """The words of 16 bits that a serial output has sent, and the time of their ends."""
+    cs, clock, data = names
+    level = {name: node.last[name] for name in names}
+    found, word, bits = [], 0, 0
+    for c in node.changes():
+        before, level[c.pin] = level[c.pin], c.value
+        if c.pin == clock and c.value >> axis & 1 and not before >> axis & 1:
+            if not level[cs] >> axis & 1:
+                word, bits = word << 1 | level[data] >> axis & 1, bits + 1
+        if c.pin == cs and c.value >> axis & 1 and not before >> axis & 1:
+            found.append((c.cycle, word, bits))
+            word, bits = 0, 0
+    return found
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_dac_gets_the_command_of_its_axis(node, axis):
+    node.start()
+    node.write("actuator.drive", 2, axis=axis)
+    node.write("actuator.dac_trim", 7, axis=axis)
+    node.write("axis.open_command", 12345, axis=axis)
+    node.enable(axis)
+    node.ticks(3)
+    node.watch_words("dac_cs_n", "dac_sclk", "dac_sdi")
+    node.run(2000)
+    sent = words(node, axis)
+    assert {(word, bits) for _, word, bits in sent} == {(32768 + 12345 + 7, 16)}
+    node.write("actuator.dac", half_period=3, refresh=700, axis=axis)
+    node.run(800)
+    node.watch_words("dac_cs_n", "dac_sclk", "dac_sdi")
+    node.run(TICK)
+    node.write("axis.control", 0, axis=axis)
+    node.run(400)
+    sent = words(node, axis)
+    assert sent[-1][1] == 32768 + 7, "0 V while the drive is off"
+    node.watch("dac_sclk")
+    node.run(900)
+    rises = [c.cycle for c in node.changes() if c.value >> axis & 1]
+    assert {b - a for a, b in zip(rises, rises[1:])} >= {6}
+
+
+def test_a_dac_repeats_its_word_after_the_refresh_time(node):
+    node.start()
+    node.write("actuator.drive", 2)
+    node.write("actuator.dac", half_period=1, refresh=300)
+    node.run(700)
+    node.watch_words("dac_cs_n", "dac_sclk", "dac_sdi")
+    node.run(1500)
+    ends = [cycle for cycle, *_ in words(node, 0)]
+    assert all(abs(b - a - 300) < 40 for a, b in zip(ends, ends[1:])) and len(ends) > 2
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_fine_stage_holds_by_its_gains_and_limit(node, axis):
+    node.start()
+    node.write("axis.strobes", set_target_to_position=1, axis=axis)
+    node.write("actuator.fine_kp", 1000, axis=axis)
+    node.write("actuator.fine_ki", 0, axis=axis)
+    node.write("actuator.fine_limit", 20000, axis=axis)
+    node.enable(axis)
+    node.ticks(2)
+    node.count(axis, -4)
+    node.ticks(3)
+    assert node.read("actuator.fine_command", axis=axis) == 0, "it is not in control"
+    node.enable(axis, fine=1)
+    node.ticks(4)
+    assert node.read("actuator.fine_command", axis=axis) == 1000
+    assert node.read("actuator.fine_command", axis=other(axis)) == 0
+    node.watch_words("dac_cs_n", "dac_sclk", "dac_sdi")
+    node.run(TICK)
+    assert {word for _, word, _ in words(node, axis)} == {32768 + 1000}
+    node.write("actuator.fine_ki", 1 << 16, axis=axis)
+    node.ticks(3)
+    now = node.read("actuator.fine_command", axis=axis)
+    node.ticks(3)
+    assert node.read("actuator.fine_command", axis=axis) > now > 1000
+    assert "fine_saturated" not in node.bits("axis.state", axis)
+    node.write("actuator.fine_limit", 900, axis=axis)
+    node.ticks(3)
+    assert node.read("actuator.fine_command", axis=axis) == 900
+    assert "fine_saturated" in node.bits("axis.state", axis)
+    node.write("axis.control", 0, axis=axis)
+    node.ticks(2)
+    node.watch_words("dac_cs_n", "dac_sclk", "dac_sdi")
+    node.run(TICK)
+    assert {word for _, word, _ in words(node, axis)} == {32768}
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_crossings_of_zero_are_reported_with_their_direction(node, axis):
+    node.start()
+    node.count(axis, 3)
+    node.run(100)
+    node.write("axis.zero_crossing", 3, axis=axis)
+    node.count(axis, -5)
+    node.run(100)
+    assert node.bits("axis.zero_crossing", axis) == {"down"}
+    node.write("axis.zero_crossing", 3, axis=axis)
+    node.count(axis, 5)
+    node.run(100)
+    assert node.bits("axis.zero_crossing", axis) == {"up"}
+    node.write("axis.zero_crossing", 3, axis=axis)
+    node.write("axis.shift_origin", -5, axis=axis)
+    node.run(100)
+    assert node.bits("axis.zero_crossing", axis) == set(), "a shift is no motion"
