@@ -14,7 +14,6 @@ sine. This distance is the same at every homing.
 """
 
 import argparse
-import random
 import sys
 import time
 from collections.abc import Sequence
@@ -26,12 +25,11 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.s0_stage import ADDRESSES, LEFT_OUT, POLL_S, Stage, random_moves, table
+from experiments.s0_stage import LEFT_OUT, Stage, random_moves, table
 from moire.analysis import report
-from moire.client.bus import Bus
 from moire.client.records import CalibrationState
 from moire.errors import MoireError
-from twin import BuildError, Twin, TwinTransport
+from twin import BuildError
 from twin.build import ROOT
 from twin.machines.machine import MachineHandle, Trace
 from twin.nodes.twin import drives
@@ -63,15 +61,7 @@ class FineStage(Stage):
     @classmethod
     def power_up(cls, seed: int = 1, names: Sequence[str] = ("X",), **plant: Any) -> Self:
         """The machine with these axes after power-up; `plant` overrides parameters of its model."""
-        twin = Twin(
-            seed=seed,
-            nodes=tuple(ADDRESSES[name] for name in names),
-            plant={"piezo_fitted": 1, **plant},
-            node_parameters=NODE,
-        )
-        bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
-        twin.run_until_ready()
-        return cls(twin, bus, {name: bus.axis(ADDRESSES[name]) for name in names})
+        return super().power_up(seed, names, node_parameters=NODE, **{"piezo_fitted": 1, **plant})
 
     def calibrate_ellipse(self, name: str) -> CalibrationState:
         """Moves an axis back and forth until the calibration accepts a measurement, and freezes the

@@ -29,7 +29,7 @@ from moire.client.records import Identity, Status
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport
 from twin.build import ROOT
-from twin.nodes.twin import CLK_HZ
+from twin.nodes.twin import CLK_HZ, NODE
 
 ADDRESSES = {"X": 1, "Y": 2}  # on the bus; the axes of the twin have the same order
 PERIOD_NM = 800.0
@@ -56,12 +56,28 @@ class Stage:
     zero_nm: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def power_up(cls, seed: int = 1, *, clk_hz: int = CLK_HZ, **plant: Any) -> Self:
-        """The machine after power-up; `plant` overrides parameters of its model."""
-        twin = Twin(seed=seed, nodes=tuple(ADDRESSES.values()), clk_hz=clk_hz, plant=plant)
+    def power_up(
+        cls,
+        seed: int = 1,
+        names: Sequence[str] = tuple(ADDRESSES),
+        *,
+        clk_hz: int = CLK_HZ,
+        node_parameters: Mapping[str, int] = NODE,
+        **plant: Any,
+    ) -> Self:
+        """The machine with these axes after power-up; `plant` overrides parameters of its model,
+        `node_parameters` are those of rtl/node.sv.
+        """
+        twin = Twin(
+            seed=seed,
+            nodes=tuple(ADDRESSES[name] for name in names),
+            clk_hz=clk_hz,
+            plant=plant,
+            node_parameters=node_parameters,
+        )
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
         twin.run_until_ready()
-        return cls(twin, bus, {})
+        return cls(twin, bus, {name: bus.axis(ADDRESSES[name]) for name in names})
 
     def find(self) -> list[Identity]:
         """Finds both nodes and checks that their register maps fit this host."""

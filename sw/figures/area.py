@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
-from figures.common import Figure, console, seeds
+from figures.common import Figure, console
 from figures.synthesis import (
     ECP5,
     ECP5_CELLS,
@@ -18,15 +18,15 @@ from figures.synthesis import (
     UP5K,
     elaborated,
     lut4s,
+    mhz_words,
     netlist_of,
-    placed,
+    placements,
     source_of,
 )
 from twin import build
 
 Parameters = Mapping[str, int | str]
 
-PLACEMENTS = 3  # of a clock the worst is taken
 TARGET_MHZ = 66
 ALL_AXES = 255
 BEFORE = 2  # axes of the node that gets another one
@@ -121,15 +121,13 @@ def on_ecp5(parameters: tuple[tuple[str, int | str], ...], seed: int) -> dict[st
     """{lut, fmax_mhz} of a node on an LFE5U-25F-6, the worst of some placements."""
     netlist = netlist_of(source_of("node"), dict(parameters), "ecp5", 1)
     more = ("--lpf-allow-unconstrained", "--out-of-context")
-    tries = [
-        placed(netlist, "ecp5", ECP5, TARGET_MHZ, one, *more) for one in seeds(seed, PLACEMENTS)
-    ]
+    tries = placements(netlist, "ecp5", ECP5, TARGET_MHZ, seed, *more)
     used = tries[0][1]
     words = ", ".join(
         f"{used[cell]['used']} of {used[cell]['available']} {name.replace('_', ' ')}"
         for name, cell in ECP5_CELLS.items()
     )
-    console.print(f"{words}; " + ", ".join(f"{mhz:.1f}" for mhz, _ in tries) + " MHz")
+    console.print(f"{words}; {mhz_words(tries)}")
     return {"lut": used[ECP5_CELLS["lut"]]["used"], "fmax_mhz": min(mhz for mhz, _ in tries)}
 
 
@@ -163,14 +161,11 @@ def node_ecp5_lut(place: bool = True, seed: int = 1) -> float:
 def on_up5k(seed: int) -> dict[str, float]:
     """{lc, fmax_mhz} of the node that counts, the worst of some placements."""
     netlist = netlist_of(COUNTER_BOX, {}, "ice40", 1, SPRAM)
-    tries = [
-        placed(netlist, "ice40", UP5K, 20, one, "--pcf-allow-unconstrained", *FULL)
-        for one in seeds(seed, PLACEMENTS)
-    ]
+    tries = placements(netlist, "ice40", UP5K, 20, seed, "--pcf-allow-unconstrained", *FULL)
     used = tries[0][1]
     names = ("ICESTORM_LC", "ICESTORM_RAM", "ICESTORM_SPRAM", "ICESTORM_DSP")
     words = ", ".join(f"{used[one]['used']} of {used[one]['available']} {one}" for one in names)
-    console.print(f"{words}; " + ", ".join(f"{mhz:.1f}" for mhz, _ in tries) + " MHz")
+    console.print(f"{words}; {mhz_words(tries)}")
     return {"lc": used["ICESTORM_LC"]["used"], "fmax_mhz": min(mhz for mhz, _ in tries)}
 
 

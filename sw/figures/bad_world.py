@@ -4,17 +4,15 @@
 What drifts does so within the run instead of within ten minutes to half an hour, which is harder.
 """
 
-import random
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from experiments.s0_stage import ADDRESSES, POLL_S, Stage, random_moves
+from experiments.s0_stage import ADDRESSES, Stage, random_moves
 from figures.common import Figure, Quick, bar, console
-from moire.client.bus import Bus
 from moire.client.segments import Segments, SegmentTable
-from twin import WITH_SEGMENTS, Twin, TwinTransport
+from twin import WITH_SEGMENTS
 from twin.parameters.tables import world
 
 SEED = 1
@@ -28,17 +26,14 @@ def bad_stage(seed: int, axes: int = len(ADDRESSES), **plant: Any) -> Stage:
     """S0's axes, or the first of them, in a bad world; their nodes have a segment table and
     listen.
     """
-    addresses = dict(list(ADDRESSES.items())[:axes])
-    effects = {**world("bad"), "drift_time": DRIFT_S, "temperature_time": DRIFT_S, **plant}
-    twin = Twin(
-        seed=seed,
-        nodes=tuple(addresses.values()),
-        plant=effects,
-        node_parameters=WITH_SEGMENTS,
-    )
-    bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
-    twin.run_until_ready()
-    return Stage(twin, bus, {name: bus.axis(address) for name, address in addresses.items()})
+    effects: dict[str, Any] = {
+        **world("bad"),
+        "drift_time": DRIFT_S,
+        "temperature_time": DRIFT_S,
+        **plant,
+    }
+    names = list(ADDRESSES)[:axes]
+    return Stage.power_up(seed, names, node_parameters=WITH_SEGMENTS, **effects)
 
 
 def reading_nm(stage: Stage, name: str) -> float:

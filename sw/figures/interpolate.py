@@ -5,8 +5,16 @@ large it is.
 
 from pathlib import Path
 
-from figures.common import Figure, Quick, console, seeds
-from figures.synthesis import ECP5, ECP5_CELLS, ELABORATED, elaborated, netlist_of, placed
+from figures.common import Figure, Quick, console
+from figures.synthesis import (
+    ECP5,
+    ECP5_CELLS,
+    ELABORATED,
+    elaborated,
+    mhz_words,
+    netlist_of,
+    placements,
+)
 from twin.build import ROOT, run, simulation
 
 HERE = Path(__file__).resolve().parent
@@ -14,7 +22,6 @@ CHANNEL = ROOT / "rtl" / "feedback_channel.sv"
 DRIVER = HERE / "interpolate_latency.cpp"
 BENCH = HERE / "interpolator_bench.sv"
 SEED = 1  # of the first placement
-PLACEMENTS = 3  # of a clock the worst is taken
 W = 8  # bits of S0's ADC
 LEADING = 2  # bits that it sends before them
 
@@ -31,16 +38,14 @@ def interpolate_ecp5_mhz(place: bool = True, seed: int = SEED) -> float:
         return elaborated(BENCH, {"W": W})
     netlist = netlist_of(BENCH, {"W": W}, "ecp5", 1)
     alone = "--lpf-allow-unconstrained", "--out-of-context"
-    tries = [placed(netlist, "ecp5", ECP5, 110, one, *alone) for one in seeds(seed, PLACEMENTS)]
+    tries = placements(netlist, "ecp5", ECP5, 110, seed, *alone)
     used = tries[0][1]
     console.print(
         "filter, correction, arctan, harmonics, tracker, position: "
         + ", ".join(
             f"{used[cell]['used']} {name.replace('_', ' ')}" for name, cell in ECP5_CELLS.items()
         )
-        + "; "
-        + ", ".join(f"{mhz:.1f}" for mhz, _ in tries)
-        + " MHz"
+        + f"; {mhz_words(tries)}"
     )
     return min(mhz for mhz, _ in tries)
 

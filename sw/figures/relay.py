@@ -12,7 +12,15 @@ from typing import Any
 
 from campaigns.campaign import Campaign
 from figures.common import Figure, Quick, bar, console, seeds, shares
-from figures.synthesis import ELABORATED, UP5K, elaborated, netlist_of, placed, source_of
+from figures.synthesis import (
+    ELABORATED,
+    UP5K,
+    elaborated,
+    mhz_words,
+    netlist_of,
+    placements,
+    source_of,
+)
 from twin.build import ROOT, run, simulation
 
 RELAY = ROOT / "rtl" / "relay.sv"
@@ -26,7 +34,6 @@ EDGES = 10**7
 SHARE = 10**6  # edges of one run, each with a seed, and so a ring, of its own
 POINTS = 2048
 RINGS = 4
-PLACEMENTS = 3  # the figure is the worst of them
 RATES_MHZ = (24, 30, 36, 40, 44, 46, 47, 47.5)
 
 
@@ -90,11 +97,8 @@ def relay_edge_mhz(edges: int = SHARE, rates: Sequence[float] = RATES_MHZ, seed:
 @cache
 def up5k(first: int) -> dict[str, float]:
     netlist = netlist_of(source_of("relay"), {"K": 16}, "ice40", 1)
-    tries = [
-        placed(netlist, "ice40", UP5K, 24, seed, "--pcf-allow-unconstrained")
-        for seed in seeds(first, PLACEMENTS)
-    ]
-    console.print("placements: " + ", ".join(f"{mhz:.1f}" for mhz, _ in tries) + " MHz")
+    tries = placements(netlist, "ice40", UP5K, 24, first, "--pcf-allow-unconstrained")
+    console.print(f"placements: {mhz_words(tries)}")
     fmax, used = min(tries, key=lambda one: one[0])
     part = {
         name: used[cell]

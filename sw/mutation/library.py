@@ -12,9 +12,9 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from mutation.connections import ROOT
 from mutation.mutants import Design
 from twin import build
+from twin.build import ROOT
 
 DRIVER = Path(__file__).with_name("bench.cpp")
 PORT = re.compile(r"VL_(IN|OUT)(?:8|16|64)?\(&(\w+),(\d+),(\d+)\);")

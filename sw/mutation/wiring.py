@@ -22,9 +22,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from mutation.connections import ROOT, RTL, Connection, diagrams, of_diagram
+from mutation.connections import RTL, Connection, diagrams, of_diagram
 from mutation.library import library
 from mutation.mutants import Design, Mutant
+from twin.build import ROOT
 
 REASONS = Path(__file__).with_name("wiring.toml")
 DESIGNS = {  # diagrams of a design; all others are in the node

@@ -160,6 +160,21 @@ def test_the_floor_shakes_the_table_as_its_spectrum_says():
     assert abs(still.state.position_m - 60e-3) < 1e-9
 
 
+def test_the_floor_goes_on_when_a_parameter_changes():
+    """A changed parameter takes over nothing but itself: the tones keep their phases."""
+    moved = []
+    for changes in (False, True):
+        stage = Stage(**SMOOTH, screw_damping=200.0, floor_velocity=12.5e-6)
+        stage.set_position(60e-3)
+        stage.hold(rotor=True)
+        stage.run(0.3)
+        if changes:
+            stage.set(signal_noise=0.25)
+        stage.run(0.3)
+        moved.append(stage.state.position_m)
+    assert moved[0] == moved[1]
+
+
 def test_cogging_and_ripple_are_torques_of_the_angle():
     """A motor without friction rests where its cogging pulls it."""
     stage = Stage(**SMOOTH, motor_cogging=2e-3, screw_preload=0.0)

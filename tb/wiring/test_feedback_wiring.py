@@ -183,9 +183,9 @@ def test_each_source_captures_with_its_bit_position_and_time(node):
 
     def captured(source, action):
         node.write("feedback.capture_sources", source)
+        before = node.read("node.time_stamp")  # a tick may come at any time from here on
         node.write("feedback.strobes", capture_clear=1)
         node.run(10)
-        before = node.read("node.time_stamp")
         action()
         node.run(10)
         after = node.read("node.time_stamp")

@@ -12,17 +12,14 @@ Stage::Stage(const StageParameters& parameters, uint64_t seed, uint64_t stream, 
       plant(p_, seed, stream),
       interferometer(p_, seed, stream + 1, clk_hz),
       piezo(seed, stream),
-      seed_(seed),
-      stream_(stream) {
+      floor_(time_step(), seed, stream) {
     piezo.configure(p_);
-    floor_.configure(p_.floor_velocity, time_step(), seed_, stream_);
 }
 
 void Stage::configure() {
     plant.configure();
     interferometer.configure();
     piezo.configure(p_);
-    floor_.configure(p_.floor_velocity, time_step(), seed_, stream_);
 }
 
 double Stage::coupled(uint64_t now) const {
@@ -48,7 +45,7 @@ void Stage::drive_changed(uint64_t now, unsigned before, unsigned after) {
 
 void Stage::move(uint64_t now) {
     spend(now, drive());
-    const double shaken = floor_.step();
+    const double shaken = floor_.step(p_.floor_velocity);
     plant.drivetrain.external_force = pushed_ + piezo.reaction - p_.table_mass * shaken;
     plant.step({spent_[0], spent_[1], spent_[2], spent_[3]}, time_step());
     spent_ = {};

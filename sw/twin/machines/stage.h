@@ -75,7 +75,6 @@ class Stage : public Machine {
  private:
     double coupled(uint64_t now) const;  // LSB, from the last edge of the bridge to the converters
 
-    uint64_t seed_, stream_;
     Floor floor_;
     double pushed_ = 0, coupling_ = 0;  // N; LSB at the last edge of the bridge
     uint64_t bridge_edge_ = 0;          // cycle of that edge

@@ -19,31 +19,29 @@ namespace twin {
 
 class Floor {
  public:
-    void configure(double velocity, double dt, uint64_t seed, uint64_t stream) {  // m/s rms, s
-        moves_ = velocity != 0;
+    Floor(double dt, uint64_t seed, uint64_t stream) {  // s
         RandomSource random(~seed, ~stream);
         double centre = LOWEST;
         for (Tone& tone : tones_) {
             const double turn = 2 * M_PI * centre * std::exp2(random.uniform(-1, 1) / 6);
-            tone.value = std::polar(std::sqrt(2) * velocity * turn, random.uniform(0, 2 * M_PI));
+            tone.value = std::polar(std::sqrt(2) * turn, random.uniform(0, 2 * M_PI));
             tone.turn = std::polar(1.0, turn * dt);
             centre *= THIRD;
         }
     }
-    double step() {  // m/s2, after one more time step
-        if (!moves_) return 0;
+    double step(double velocity) {  // m/s rms; m/s2, after one more time step
+        if (velocity == 0) return 0;
         double sum = 0;
         for (Tone& tone : tones_) sum += (tone.value *= tone.turn).real();
-        return sum;
+        return velocity * sum;
     }
 
  private:
     static constexpr double LOWEST = 4, THIRD = 1.2599210498948732;
     static constexpr int BANDS = 14;  // 4 to 80 Hz
     struct Tone {
-        std::complex<double> value, turn;  // acceleration, and by how much it turns in a time step
+        std::complex<double> value, turn;  // acceleration for 1 m/s, and its turn in a time step
     };
-    bool moves_ = false;
     std::array<Tone, BANDS> tones_{};
 };
 
