@@ -65,13 +65,13 @@ class Loop:
 
 
 @cocotb.test()
-async def latency_is_53_and_a_tick_within_the_calculation_is_ignored(dut):
+async def latency_is_101_and_a_tick_within_the_calculation_is_ignored(dut):
     loop = await Loop(dut).reset(kp=ONE, target=9)
     await loop.tick()
     out, cycles = await loop.clk(tick=1), 1
     while not out[0]:
         out, cycles = await loop.clk(tick=1), cycles + 1
-    assert cycles == LATENCY + 1 == 53 and out[1] == 9
+    assert cycles == LATENCY + 1 == 101 and out[1] == 9
 
 
 @cocotb.test()
