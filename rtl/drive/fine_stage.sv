@@ -2,8 +2,8 @@
 // fine_stage -- control the fine stage: a PI loop with the same target as the main servo, which
 // drives the DAC.
 //
-// latency  53 cycles from tick to command
-// rate     one command per tick, a tick at least 53 cycles after the one before
+// latency  101 or 125 cycles from tick to command
+// rate     one command per tick, a tick at least 101 or 125 cycles after the one before
 // behaviour  While the fine stage does not hold the position, its command returns to the middle by
 //          RETURN in each tick. That is slow enough for the main servo to follow. When the fine
 //          stage takes over, its loop continues from the command that it has at that moment.
