@@ -40,7 +40,8 @@ module pi_loop (
     input  wire signed  [47:0] position,       // 2^-16 period
     input  wire signed  [15:0] open_command,   // full scale 2^15, the open-loop command
     output logic               valid,          // strobe: command is new
-    output logic signed [15:0] command         // full scale 2^15
+    output logic signed [15:0] command,        // full scale 2^15
+    output logic               at_limit        // level: command is of the closed loop, and +-limit
 );
     // steps of a pass: the first one, the first whole bit of a command, the sign
     localparam bit [5:0] FIRST = 6'd24, WHOLE = 6'd48, SIGN = 6'd63;
@@ -88,6 +89,7 @@ module pi_loop (
     logic integral_over, integral_low;  // the integral is to be limited, at -limit
     logic over, low;  // the command is, or was, at its limit, at -limit
     logic bound_one;  // a bit of limit was 1
+    logic is_high, is_low;  // the bits of the new command that have passed are those of +-limit
 
     wire                take = state == WAIT && tick;
     wire signed  [48:0] distance = {target[47], target} - {position[47], position};
@@ -147,11 +149,15 @@ module pi_loop (
             if (sum_bit == limit_bit) negative_above <= !sum_bit;
             if (held_bit != limit_bit) held_above <= held_bit;
             if (held_bit == limit_bit) held_below <= !held_bit;
+            if (command_bit != limit_bit) is_high <= 1'b0;
+            if (command_bit != (limit_bit ^ bound_one)) is_low <= 1'b0;
         end else begin
             positive_above <= state == INTEGRATE || retaking;  // limit itself counts as above it
             negative_above <= 1'b1;
             held_above     <= 1'b0;
             held_below     <= 1'b1;
+            is_high        <= 1'b1;
+            is_low         <= 1'b1;
         end
         if (step == '0) step <= state == ADD && !retaking ? WHOLE : FIRST;
         case (state)
@@ -184,10 +190,11 @@ module pi_loop (
                 if (passes && retaking) integral <= {integral_bit, integral[39:1]};
                 if (passes) whole <= {command_bit, whole[15:1]};
                 if (done) begin
-                    command <= closed_loop ? whole : open_command;
-                    over    <= over && closed_loop;
-                    stopped <= 1'b0;
-                    state   <= WAIT;
+                    command  <= closed_loop ? whole : open_command;
+                    at_limit <= !no_power && (is_high || is_low);
+                    over     <= over && closed_loop;
+                    stopped  <= 1'b0;
+                    state    <= WAIT;
                 end
             end
             default: begin
@@ -217,7 +224,7 @@ module pi_loop (
         if (rst) begin
             state <= WAIT;
             step  <= FIRST;
-            {valid, command, over, changed, integral, fraction} <= '0;
+            {valid, command, at_limit, over, changed, integral, fraction} <= '0;
             {stale, fresh, stopped} <= '1;
         end
     end
@@ -242,7 +249,9 @@ module pi_loop (
         if (past && !$past(rst)) begin
             if (valid && $past(closed_loop)) assert (command <= most && command >= -most);
             if (valid && !$past(closed_loop)) assert (command == $past(open_command));
-            if (!valid) assert (command == $past(command));
+            if (!valid) assert (command == $past(command) && at_limit == $past(at_limit));
+            if (valid) assert (!at_limit || command == most || command == -most);
+            if (valid && !$past(no_power)) assert (at_limit == (command == most || command == -most));
             assert (!valid || $past(state) == GIVE);
             cover (state == INTEGRATE && negative && error[1:0] == 2'b01);
         end
@@ -277,6 +286,10 @@ module pi_loop (
                 if (hold && powered) begin
                     assert (source == (stopped ? 16'sd0 : command));
                     if (whole_on) assert (held_bit == source[now[3:0]]);
+                end
+                if (powered) begin
+                    assert (is_high == ((mask & expected) == limit_passed));
+                    assert (is_low == ((mask & expected) == (mask & -limit_passed)));
                 end
                 assert (whole_passed == (mask & expected) || (!powered && whole == '0));
                 assert (hold || over || !whole_on || !powered ||

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/drive/pi_loop.sv in integers: clk(...) advances one cycle and returns (valid,
-command) after it.
+command) after it; at_limit is an attribute.
 """
 
 PASS = 41  # cycles: one for each bit, and one to evaluate the result
@@ -24,7 +24,8 @@ class PiLoop:
         # power was off since the last command
         self.stale = self.fresh = self.stopped = 1
         self.changed = self.changed_taken = self.retaking = 0
-        self.limited = 0  # +-1: the last command was at its limit
+        self.limited = 0  # +-1: the last command was above its limit
+        self.at_limit = 0
 
     def clk(
         self,
@@ -74,6 +75,7 @@ class PiLoop:
             self.fresh = self.fresh and no_power
         elif self.n == LATENCY + self.retaking * RETAKING:
             self.command = self.asked if closed_loop else open_command
+            self.at_limit = int(not no_power and abs(self.asked) == self.limit)
             self.limited = self.limited if closed_loop else 0
             self.n, valid, self.stopped, self.retaking = None, 1, 0, 0
         elif self.n is not None and self.n > ADDED and self.stopped and no_power:

@@ -43,6 +43,7 @@ class Loop:
         want = self.model.clk(**strobes, **self.inputs)
         got = int(self.dut.valid.value), self.dut.command.value.to_signed()
         assert got == want, f"valid, command are {got}, the model has {want}"
+        assert int(self.dut.at_limit.value) == self.model.at_limit
         return got
 
     async def tick(self, **inputs):
