@@ -90,8 +90,7 @@ module bridge_pwm (
         if (!past) assume (rst);
         if (past) begin
             if (!$past(enable)) assert (!bridge_a && !bridge_b);
-            if (!$past(border) && $past(enable) && !$past(rst))
-                assert (reverse == $past(reverse));
+            if (!$past(border) && $past(enable) && !$past(rst)) assert (reverse == $past(reverse));
             if (bridge_a && !bridge_b) assert (!$past(reverse));
             if (bridge_b && !bridge_a) assert ($past(reverse));
             if (!$past(powered)) assert (!bridge_a && !bridge_b);

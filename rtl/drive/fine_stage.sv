@@ -31,7 +31,7 @@ module fine_stage #(
 );
     wire signed [15:0] moved = command + (command[15] ? RETURN : -RETURN);
     wire signed [15:0] closer = moved[15] == command[15] ? moved : 16'sd0;
-    wire at_limit;
+    wire               at_limit;
 
     pi_loop u_loop (
         .clk,

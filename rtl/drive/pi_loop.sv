@@ -70,13 +70,13 @@ module pi_loop (
     logic fraction_on, whole_on, sign_bit;
 
     logic signed [31:0] high;  // bits of the sum that have not passed yet
-    logic [39:0] integral;  // 2^-24 command
-    logic [15:0] whole;  // of the sum, then of the new command
-    logic [15:0] fraction;  // 2^-16 command, of the sum and of the last command
+    logic        [39:0] integral;  // 2^-24 command
+    logic        [15:0] whole;  // of the sum, then of the new command
+    logic        [15:0] fraction;  // 2^-16 command, of the sum and of the last command
 
-    logic stale;  // there was no power in some cycle since the inputs were taken
-    logic stopped;  // the power was off since the last command: it counts as 0
-    logic fresh;  // there was no power since the last computed command
+    logic               stale;  // there was no power in some cycle since the inputs were taken
+    logic               stopped;  // the power was off since the last command: it counts as 0
+    logic               fresh;  // there was no power since the last computed command
     // kp changed: since the inputs were taken, before they were taken
     logic changed, changed_taken;
     logic integrates;  // ki is not 0
@@ -91,41 +91,41 @@ module pi_loop (
     logic bound_one;  // a bit of limit was 1
     logic is_high, is_low;  // the bits of the new command that have passed are those of +-limit
 
-    wire                take = state == WAIT && tick;
-    wire signed  [48:0] distance = {target[47], target} - {position[47], position};
-    wire                powerless = !closed_loop || !power;
-    wire                no_power = stale || powerless;
+    wire               take = state == WAIT && tick;
+    wire signed [48:0] distance = {target[47], target} - {position[47], position};
+    wire               powerless = !closed_loop || !power;
+    wire               no_power = stale || powerless;
 
     // the bits of step
-    wire         [63:0] ki_bits = {16'd0, taken_ki, 24'd0};
-    wire         [63:0] kp_bits = {8'd0, taken_kp, 32'd0};
-    wire         [63:0] limit_bits = {1'b0, taken_limit, 48'd0};
-    wire         [63:0] held_bits = {command, fraction, 32'd0};
-    wire                blocked = over && low == negative;
-    wire                ki_bit = state == INTEGRATE && ki_bits[step];
-    wire                gain = (ki_bit && !blocked) || (state == ADD && kp_bits[step]);
+    wire        [63:0] ki_bits = {16'd0, taken_ki, 24'd0};
+    wire        [63:0] kp_bits = {8'd0, taken_kp, 32'd0};
+    wire        [63:0] limit_bits = {1'b0, taken_limit, 48'd0};
+    wire        [63:0] held_bits = {command, fraction, 32'd0};
+    wire               blocked = over && low == negative;
+    wire               ki_bit = state == INTEGRATE && ki_bits[step];
+    wire               gain = (ki_bit && !blocked) || (state == ADD && kp_bits[step]);
 
-    wire                integral_bound = limit_bit ^ (bound_one && integral_low);
-    wire                integral_bit = integral_over ? integral_bound : integral[0];
-    wire                command_bound = limit_bit ^ (bound_one && low);
-    wire                command_bit = over ? command_bound : hold ? held_bit : whole[0];
+    wire               integral_bound = limit_bit ^ (bound_one && integral_low);
+    wire               integral_bit = integral_over ? integral_bound : integral[0];
+    wire               command_bound = limit_bit ^ (bound_one && low);
+    wire               command_bit = over ? command_bound : hold ? held_bit : whole[0];
 
     // The sum of the product and a number, plus 2^39 so that what is above 40 bits is 0 if the sum
     // fits. The held command less the product is the complement of its complement plus the product.
-    wire                start_bit = retaking && fraction_on ? held_bit : integral_bit;
-    wire                carry = start_bit ^ retaking ^ sign_bit;
-    wire         [31:0] operand = {adds_sign, ({31{adds_error}} & error) | {31{adds_ones}}};
-    wire         [33:0] sum = {high[31], high, 1'b1} + {operand[31], operand, carry};
-    wire                sum_bit = sum[1] ^ retaking ^ sign_bit;
+    wire               start_bit = retaking && fraction_on ? held_bit : integral_bit;
+    wire               carry = start_bit ^ retaking ^ sign_bit;
+    wire        [31:0] operand = {adds_sign, ({31{adds_error}} & error) | {31{adds_ones}}};
+    wire        [33:0] sum = {high[31], high, 1'b1} + {operand[31], operand, carry};
+    wire               sum_bit = sum[1] ^ retaking ^ sign_bit;
 
     // the result of a pass, when it is done; it has 64 bits at most
-    wire                too_long = high[23:0] != '0;
-    wire                result_low = too_long ? high[23] ^ retaking : last_bit;
-    wire                result_over = too_long || (result_low ? negative_above : positive_above);
-    wire                held_low = command[15] && !stopped;
-    wire                held_over = held_low ? held_below : held_above;
-    wire                holds = retaking || no_power;
-    wire                to_limit = holds ? held_over : result_over;
+    wire               too_long = high[23:0] != '0;
+    wire               result_low = too_long ? high[23] ^ retaking : last_bit;
+    wire               result_over = too_long || (result_low ? negative_above : positive_above);
+    wire               held_low = command[15] && !stopped;
+    wire               held_over = held_low ? held_below : held_above;
+    wire               holds = retaking || no_power;
+    wire               to_limit = holds ? held_over : result_over;
 
     always_ff @(posedge clk) begin
         valid       <= state == GIVE && done;
@@ -230,18 +230,18 @@ module pi_loop (
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic               past = 1'b0;
     logic signed [15:0] source = '0;  // what GIVE limits
-    wire [5:0] now = step - 1'b1;  // number of the bit that passes
+    wire         [ 5:0] now = step - 1'b1;  // number of the bit that passes
     // of the 16 bits of a command: those that have passed, and in limit, the sum and what is held
-    wire [4:0] passed = whole_on ? {1'b0, now[3:0]} : {done, 4'd0};
-    wire [15:0] mask = ~(16'hFFFF << passed);
-    wire [15:0] limit_passed = mask & {1'b0, taken_limit};
-    wire [15:0] held_passed = mask & command;
-    wire [15:0] whole_passed = whole >> (5'd16 - passed);
-    wire signed [15:0] most = {1'b0, taken_limit};
-    wire signed [15:0] expected = !over ? source : low ? -most : most;
-    wire powered = !(stopped && stale);
+    wire         [ 4:0] passed = whole_on ? {1'b0, now[3:0]} : {done, 4'd0};
+    wire         [15:0] mask = ~(16'hFFFF << passed);
+    wire         [15:0] limit_passed = mask & {1'b0, taken_limit};
+    wire         [15:0] held_passed = mask & command;
+    wire         [15:0] whole_passed = whole >> (5'd16 - passed);
+    wire signed  [15:0] most = {1'b0, taken_limit};
+    wire signed  [15:0] expected = !over ? source : low ? -most : most;
+    wire                powered = !(stopped && stale);
     always @(posedge clk) begin
         past <= 1'b1;
         if (state == ADD && done) source <= !holds ? whole : stopped ? '0 : command;
@@ -251,7 +251,8 @@ module pi_loop (
             if (valid && !$past(closed_loop)) assert (command == $past(open_command));
             if (!valid) assert (command == $past(command) && at_limit == $past(at_limit));
             if (valid) assert (!at_limit || command == most || command == -most);
-            if (valid && !$past(no_power)) assert (at_limit == (command == most || command == -most));
+            if (valid && !$past(no_power))
+                assert (at_limit == (command == most || command == -most));
             assert (!valid || $past(state) == GIVE);
             cover (state == INTEGRATE && negative && error[1:0] == 2'b01);
         end

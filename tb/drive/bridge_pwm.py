@@ -28,6 +28,4 @@ class BridgePwm:
         self.next = self.asked
         if valid:
             self.asked = command, period
-        return int(powered and not (drives and negative)), int(
-            powered and (not drives or negative)
-        )
+        return int(powered and not (drives and negative)), int(powered and (not drives or negative))
