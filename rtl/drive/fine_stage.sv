@@ -2,7 +2,7 @@
 // fine_stage -- control the fine stage: a PI loop with the same target as the main servo, which
 // drives the DAC.
 //
-// latency  101 or 125 cycles from tick to command
+// latency  101 cycles from tick to command, 125 in a tick in which the integral is retaken
 // rate     one command per tick, a tick at least 125 cycles after the one before
 // behaviour  While the fine stage does not hold the position, its command returns to the middle by
 //          RETURN in each tick. That is slow enough for the main servo to follow. When the fine

@@ -117,6 +117,7 @@ module pi_loop (
     wire        [31:0] operand = {adds_sign, ({31{adds_error}} & error) | {31{adds_ones}}};
     wire        [33:0] sum = {high[31], high, 1'b1} + {operand[31], operand, carry};
     wire               sum_bit = sum[1] ^ retaking ^ sign_bit;
+    wire               unused = &{1'b0, sum[0]};
 
     // the result of a pass, when it is done; it has 64 bits at most
     wire               too_long = high[23:0] != '0;
