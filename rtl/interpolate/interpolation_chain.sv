@@ -5,7 +5,8 @@
 // latency  21 cycles from valid to done for one axis. With several axes 22 cycles for the axis that
 //          is served first, 1 cycle more for each axis with a lower number whose sample waits, too:
 //          21 + AXES at most; 4 cycles less without harmonics
-// rate     one sample per cycle, of all axes together
+// rate     one sample per cycle, of all axes together; a chain of one axis takes one sample per
+//          SAMPLE_CYCLES
 // behaviour  All axes share the arithmetic. State and settings of each axis are in LUT RAM, its
 //          harmonic tables in block RAM. The samples of each axis must be AXES cycles apart, or one
 //          may be lost; see sample_arbiter. SAMPLE_CYCLES of the converter below AXES stop the
@@ -89,7 +90,7 @@ module interpolation_chain #(
     logic [A-1:0] filtered_axis;
     wire signed [W-1:0] served_sin, served_cos;
     wire signed [15:0] corrected_sin, corrected_cos;
-    wire [15:0] amplitude, straight_phase;
+    wire        [15:0] straight_phase;
     wire signed [31:0] tracked_count = $signed(count[32*tracked_axis+:32]);
 
     if (AXES == 1) begin : g_one
@@ -202,9 +203,8 @@ module interpolation_chain #(
         .sin_out(corrected_sin),
         .cos_out(corrected_cos)
     );
-    arctan_pipelined #(
-        .W    (16),
-        .STEPS(2)
+    arctan_quotient #(
+        .SAMPLE_CYCLES(AXES == 1 ? SAMPLE_CYCLES : 1)
     ) u_arctan (
         .clk,
         .rst,
@@ -214,8 +214,7 @@ module interpolation_chain #(
         .cos  (corrected_cos),
         // phase
         .done (found),
-        .phase(plain_phase),
-        .amplitude
+        .phase(plain_phase)
     );
     if (HAS_HARMONICS != 0) begin : g_harmonics
         harmonic_correction #(
@@ -306,8 +305,6 @@ module interpolation_chain #(
             limit_known   <= '0;
         end
     end
-
-    wire unused = &{1'b0, amplitude};
 endmodule
 
 `default_nettype wire

@@ -22,7 +22,7 @@ from tb.bench import ROOT, package, run, search_path, source_of, start
 ALL = 255
 BLOCKS = ("axis", "feedback", "actuator")
 MODULES = {  # of a feature, which are gone without it
-    "sine": ("dual_adc_reader", "outlier_filter", "signal_correction", "arctan_pipelined"),
+    "sine": ("dual_adc_reader", "outlier_filter", "signal_correction", "arctan_quotient"),
     "monitor": ("signal_monitor", "lissajous_monitor", "channel_monitor", "vector_length"),
     "harmonics": ("harmonic_correction",),
     "recorder": ("calibration_recorder",),
