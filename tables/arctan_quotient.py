@@ -94,7 +94,7 @@ def text() -> str:
 
 module arctan_parabola_rom (
     input  wire  [ {INDEX - 1}:0] index,  // 1/{1 << INDEX} of the quotient
-    output logic [{bits[0] - 1}:0] base,   // 1/{1 << GUARD} LSB of phase, with the half for rounding
+    output logic [{bits[0] - 1}:0] base,   // 1/{1 << GUARD} LSB of phase, rounding included
     output logic [{bits[1] - 1}:0] slope,  // 1/{1 << SLOPE_BITS} LSB of phase for a quotient of 1
     output logic [ {bits[2] - 1}:0] bend    // {1 << BEND_BITS} LSB of phase for a quotient of 1
 );

@@ -10,7 +10,7 @@
 
 module arctan_parabola_rom (
     input  wire  [ 4:0] index,  // 1/32 of the quotient
-    output logic [18:0] base,   // 1/64 LSB of phase, with the half for rounding
+    output logic [18:0] base,   // 1/64 LSB of phase, rounding included
     output logic [15:0] slope,  // 1/4 LSB of phase for a quotient of 1
     output logic [ 7:0] bend    // 16 LSB of phase for a quotient of 1
 );

@@ -35,34 +35,35 @@ module arctan_quotient #(
     localparam int PAIRS = 9;  // of digits; the sign of the last remainder gives one more
     localparam bit SERIAL = SAMPLE_CYCLES >= LATENCY;
 
-    // |sin| - |cos| with the sign of sin; 1 less if both signs are equal
-    wire                      differ = sin[15] ^ cos[15];
-    wire signed [       16:0] gap = 17'(sin) + (17'(cos) ^ {17{!differ}});
-    wire                      steep = gap[16] == sin[15];  // sin is the larger component
-    wire        [       15:0] larger = steep ? sin : cos;
-    wire        [       15:0] smaller = steep ? cos : sin;
+    wire                differ = sin[15] ^ cos[15];
+    // the sign of |sin| - |cos| times the sign of sin; of 1 less if both signs are equal
+    wire                gap = 1'((17'(sin) + (17'(cos) ^ {17{!differ}})) >> 16);
+    wire                steep = gap == sin[15];  // sin is the larger component
+    wire  [       15:0] larger = steep ? sin : cos;
+    wire  [       15:0] smaller = steep ? cos : sin;
 
-    logic       [LATENCY-1:0] coming;  // the sample is that many cycles old, less one
-    wire                      first_pairs = coming[2:0] != '0;
+    logic [LATENCY-1:0] coming;  // the sample is that many cycles old, less one
 
     // The state of the division after n pairs of digits. If SERIAL, it is one state for all n.
     for (genvar n = 0; n <= PAIRS; n++) begin : g_step
+        /* verilator lint_off UNUSEDSIGNAL */  // the synthesis removes what no later step needs
         logic signed [16:0] remainder;  // at most as large as divisor
-        logic [15:0] divisor;
-        logic negative;  // the quotient is
-        logic steep_q;
-        logic [5:0] head;  // digits of the magnitude of the quotient from the first on, 1: positive
-        logic [11:0] tail;  // the last digits
-        // after the next pair
-        wire once = remainder[16] == divisor[15];
+        logic        [15:0] divisor;
+        logic negative, steep_q;  // negative: the quotient is
+        // digits of the magnitude of the quotient, 1 for a positive one
+        logic       [ 5:0] head;  // the first ones
+        logic       [11:0] tail;  // the last ones so far
+        // after the next two digits
+        wire               once = remainder[16] == divisor[15];
         wire signed [16:0] divisor_once = {divisor[15], divisor} ^ {17{once}};
         wire signed [16:0] halfway = {remainder[15:0], once} + divisor_once;
-        wire twice = halfway[16] == divisor[15];
+        wire               twice = halfway[16] == divisor[15];
         wire signed [16:0] divisor_twice = {divisor[15], divisor} ^ {17{twice}};
         wire signed [16:0] next_remainder = {halfway[15:0], twice} + divisor_twice;
-        wire [1:0] pair = {once, twice} ^ {2{negative}};
-        wire [5:0] next_head = {head[3:0], pair};
-        wire [11:0] next_tail = {tail[9:0], pair};
+        wire        [ 1:0] pair = {once, twice} ^ {2{negative}};
+        wire        [ 5:0] next_head = {head[3:0], pair};
+        wire        [11:0] next_tail = {tail[9:0], pair};
+        /* verilator lint_on UNUSEDSIGNAL */
 
         if (!SERIAL && n == 0) begin : g_first
             always_ff @(posedge clk) begin
@@ -86,7 +87,7 @@ module arctan_quotient #(
             always_ff @(posedge clk) begin
                 remainder <= valid ? {smaller[15], smaller} : next_remainder;
                 tail      <= next_tail;
-                if (first_pairs) head <= next_head;
+                if (coming[2:0] != '0) head <= next_head;
                 if (valid) begin
                     divisor  <= larger;
                     negative <= differ;
@@ -153,8 +154,7 @@ module arctan_quotient #(
     logic signed [30:0] rise;
     logic [1:0] quarter;
     logic falls, zero;
-    wire [19:0] sum = {1'b0, base} + 20'(rise >>> 15);
-    wire [15:0] octant = {2'd0, sum[19:6]};
+    wire [15:0] octant = 16'(({1'b0, base} + 20'(rise >>> 15)) >> 6);
 
     always_ff @(posedge clk) begin
         coming  <= {coming[LATENCY-2:0], valid};

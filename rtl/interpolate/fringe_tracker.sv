@@ -59,11 +59,11 @@ module fringe_tracker #(
     wire                follows = known && fits && near;
     wire                strays = known && fits && !near && !outlier;
     wire signed  [16:0] measured_step = {periods[0], moved};  // if it fits
-    wire signed  [17:0] way_back = 18'(speed) - 18'(deviation);
+    wire signed  [17:0] step_back = 18'(speed) - 18'(deviation);
 
     // state after this phase
     logic signed [16:0] new_speed;
-    wire signed  [17:0] new_predicted_step = strays ? way_back : 18'(new_speed);
+    wire signed  [17:0] new_predicted_step = strays ? step_back : 18'(new_speed);
     always_comb begin
         new_speed = '0;
         if (follows && !outlier) new_speed = measured_step;

@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge
 
-from tables import arctan_quotient
+from tables.arctan_quotient import bound as arctan_bound
 from tb.bench import run, seed, start
-from tb.interpolate.arctan_quotient import phase_of
+from tb.interpolate import arctan_quotient
 from tb.interpolate.fringe_tracker import FringeTracker
 from tb.position.unwrap import Unwrap
 
 PERIOD_NM = 800
 LATENCY = 22  # cycles from an ADC word to its position
-ARCTAN = arctan_quotient.bound()  # LSB of phase
+ARCTAN = arctan_bound()  # LSB of phase
 INPUTS = dict(
     setting=0, setting_written=0, harmonic_enable=0, shift_periods=0, valid=0, sin=0, cos=0
 )
@@ -130,7 +130,7 @@ def phase_of(w, sin, cos):
     """The phase of a word that the correction does not change: both channels leave it at half the
     size.
     """
-    return phase_of(*((channel << 16 - w) + 1 >> 1 for channel in (sin, cos)))
+    return arctan_quotient.phase_of(*((channel << 16 - w) + 1 >> 1 for channel in (sin, cos)))
 
 
 class Chain:
