@@ -36,8 +36,6 @@ module fringe_tracker #(
     output logic [15:0] phase_out,  // 2^-16 period: the phase after step; held until done
     output logic overspeed  // strobe, with done: a quarter period or more off
 );
-    localparam signed [15:0] QUARTER = 16'sd16384;
-
     logic       [AXES-1:0] started;
     wire                   outlier;  // the last phase was an overspeed
     wire        [    15:0] last;
@@ -53,8 +51,9 @@ module fringe_tracker #(
     assign {borrow, deviation} = {1'b0, moved} - {1'b0, predicted_step[15:0]};
     // predicted_step + deviation is moved and so many periods; no adder is needed for its fraction
     wire signed  [ 2:0] periods = 3'(predicted_step >>> 16) - 3'(deviation[15]) + 3'(borrow);
-    // less than a quarter period
-    wire                near = deviation[15] == deviation[14] && deviation != -QUARTER;
+    // less than a quarter period; equal fractions show -QUARTER before the difference is there
+    wire                same_fraction = moved[13:0] == predicted_step[13:0];
+    wire                near = deviation[15] == deviation[14] && !(deviation[15] && same_fraction);
     wire                fits = periods == '0 || periods == '1;
     wire                follows = known && fits && near;
     wire                strays = known && fits && !near && !outlier;
@@ -100,6 +99,7 @@ module fringe_tracker #(
     end
 
 `ifdef FORMAL
+    localparam signed [15:0] QUARTER = 16'sd16384;
     wire signed [18:0] wide_step = {periods, moved};
     logic              past = 1'b0;
     always @(posedge clk) begin

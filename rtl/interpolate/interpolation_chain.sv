@@ -73,7 +73,6 @@ module interpolation_chain #(
     logic [ 31:0] value;
     logic [A-1:0] setting_axis;
     logic [  7:0] written;  // strobes of setting_axis
-    logic [AXES-1:0] outlier_known, limit_known;  // written since reset
     wire [7:0] outlier_step, outlier_hold;
     wire [ 19:0] limit;
     wire         load_values;
@@ -117,22 +116,24 @@ module interpolation_chain #(
     end
 
     // settings
-    axis_memory #(
+    axis_setting #(
         .AXES (AXES),
         .WIDTH(16)
     ) u_outlier_settings (
         .clk,
+        .rst,
         .write     (written[0]),
         .write_axis(setting_axis),
         .value     (value[31:16]),
         .axis      (served_axis),
         .stored    ({outlier_hold, outlier_step})
     );
-    axis_memory #(
+    axis_setting #(
         .AXES (AXES),
         .WIDTH(20)
     ) u_limit (
         .clk,
+        .rst,
         .write     (written[1]),
         .write_axis(setting_axis),
         .value     (value[19:0]),
@@ -167,7 +168,7 @@ module interpolation_chain #(
         .clk,
         .rst,
         // settings
-        .step    (outlier_known[served_axis] ? outlier_step : 8'd0),
+        .step    (outlier_step),
         .hold    (outlier_hold),
         // sample
         .valid   (served),
@@ -267,7 +268,7 @@ module interpolation_chain #(
         .axis (tracked_axis),
         .step,
         .count(tracked_count),
-        .limit(limit_known[tracked_axis] ? limit : 20'd0),
+        .limit,
         .disagreement
     );
 
@@ -295,14 +296,10 @@ module interpolation_chain #(
         filtered_axis <= served_axis;
         lost          <= overruns;
         axes          <= {axes[A*(CYCLES-1)-1:0], filtered_axis};
-        if (written[0]) outlier_known[setting_axis] <= 1'b1;
-        if (written[1]) limit_known[setting_axis] <= 1'b1;
         if (rst) begin
             filtered_axis <= '0;
             lost          <= '0;
             axes          <= '0;
-            outlier_known <= '0;
-            limit_known   <= '0;
         end
     end
 endmodule
