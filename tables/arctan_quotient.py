@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Make rtl/interpolate/arctan_parabola_rom.sv, the arctangent of one octant as 32 parabolas.
+"""Make rtl/interpolate/arctan_quotient_rom.sv, the arctangent of one octant as 32 parabolas.
 
 arctan_quotient divides the smaller component of a sample by the larger one. A digit of the quotient
 is 1 or -1, so DIGITS digits leave an error of 2^-DIGITS at most, in either direction. The first
@@ -24,7 +24,7 @@ BEND_BITS = 4  # integer bits of bend that are left out, in LSB for a quotient o
 UNIT = (1 << PHASE) / math.tau  # LSB per radian
 REACH = 2.0 ** -(INDEX + 1)  # t at the ends of a parabola
 
-MADE = ROOT / "rtl" / "interpolate" / "arctan_parabola_rom.sv"
+MADE = ROOT / "rtl" / "interpolate" / "arctan_quotient_rom.sv"
 
 
 def parabola(index: int) -> tuple[int, int, int]:
@@ -83,7 +83,7 @@ def text() -> str:
     last = ", ".join(f"{width}'d{value}" for width, value in zip(bits, PARABOLAS[-1]))
     return f"""\
 // SPDX-License-Identifier: Apache-2.0
-// arctan_parabola_rom -- the arctangent of 0 to 1 as {1 << INDEX} parabolas; made by
+// arctan_quotient_rom -- the arctangent of 0 to 1 as {1 << INDEX} parabolas; made by
 // tables/arctan_quotient.py, not to be edited.
 //
 // latency  0 cycles from index to its outputs: a table without a register
@@ -92,7 +92,7 @@ def text() -> str:
 // model    PARABOLAS of tables/arctan_quotient.py
 `default_nettype none
 
-module arctan_parabola_rom (
+module arctan_quotient_rom (
     input  wire  [ {INDEX - 1}:0] index,  // 1/{1 << INDEX} of the quotient
     output logic [{bits[0] - 1}:0] base,   // 1/{1 << GUARD} LSB of phase, rounding included
     output logic [{bits[1] - 1}:0] slope,  // 1/{1 << SLOPE_BITS} LSB of phase for a quotient of 1

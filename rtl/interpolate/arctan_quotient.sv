@@ -112,7 +112,7 @@ module arctan_quotient #(
     logic [15:0] slope;
     logic [ 7:0] bend;
     if (SERIAL) begin : g_table
-        arctan_parabola_rom u_parabolas (
+        arctan_quotient_rom u_parabolas (
             .index(g_step[0].head[4:0]),
             .base (base_now),
             .slope(slope_now),
@@ -122,19 +122,19 @@ module arctan_quotient #(
         wire [18:0] early_base, later_base;
         wire [15:0] early_slope, late_slope;
         wire [7:0] later_bend, late_bend;
-        arctan_parabola_rom u_bend (
+        arctan_quotient_rom u_bend (
             .index(g_step[6].head[4:0]),
             .base (early_base),
             .slope(early_slope),
             .bend (bend_now)
         );
-        arctan_parabola_rom u_slope (
+        arctan_quotient_rom u_slope (
             .index(g_step[7].head[4:0]),
             .base (later_base),
             .slope(slope_now),
             .bend (later_bend)
         );
-        arctan_parabola_rom u_base (
+        arctan_quotient_rom u_base (
             .index(g_step[9].head[4:0]),
             .base (base_now),
             .slope(late_slope),

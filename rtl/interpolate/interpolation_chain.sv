@@ -5,12 +5,12 @@
 // latency  21 cycles from valid to done for one axis. With several axes 22 cycles for the axis that
 //          is served first, 1 cycle more for each axis with a lower number whose sample waits, too:
 //          21 + AXES at most; 4 cycles less without harmonics
-// rate     one sample per cycle, of all axes together; a chain of one axis takes one sample per
-//          SAMPLE_CYCLES
+// rate     one sample per cycle, of all axes together; with one axis, one per SAMPLE_CYCLES
 // behaviour  All axes share the arithmetic. State and settings of each axis are in LUT RAM, its
-//          harmonic tables in block RAM. The samples of each axis must be AXES cycles apart, or one
-//          may be lost; see sample_arbiter. SAMPLE_CYCLES of the converter below AXES stop the
-//          build. overrun reports a loss at once, so that the fault of the interlock comes before
+//          harmonic tables in block RAM. The samples of each axis must be SAMPLE_CYCLES apart, or
+//          one may be lost; see sample_arbiter and, for one axis, arctan_quotient, which is built
+//          small if they are 12 or more. SAMPLE_CYCLES of the converter below AXES stop the build.
+//          overrun reports a loss at once, so that the fault of the interlock comes before
 //          any event of the axis, and lost says in the next cycle whose sample it was. A setting
 //          is the word of its register, and acts on the samples that are served after it.
 // source   the chain of S0, once for a node

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// arctan_parabola_rom -- the arctangent of 0 to 1 as 32 parabolas; made by
+// arctan_quotient_rom -- the arctangent of 0 to 1 as 32 parabolas; made by
 // tables/arctan_quotient.py, not to be edited.
 //
 // latency  0 cycles from index to its outputs: a table without a register
@@ -8,7 +8,7 @@
 // model    PARABOLAS of tables/arctan_quotient.py
 `default_nettype none
 
-module arctan_parabola_rom (
+module arctan_quotient_rom (
     input  wire  [ 4:0] index,  // 1/32 of the quotient
     output logic [18:0] base,   // 1/64 LSB of phase, rounding included
     output logic [15:0] slope,  // 1/4 LSB of phase for a quotient of 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of arctan_parabola_rom: every word against its generator, and the generator against
+"""Tests of arctan_quotient_rom: every word against its generator, and the generator against
 math.atan.
 """
 
@@ -35,5 +35,5 @@ def test_the_committed_table_is_fresh():
     assert arctan_quotient.main(["--check"]) == 0
 
 
-def test_arctan_parabola_rom():
-    run("arctan_parabola_rom", __file__)
+def test_arctan_quotient_rom():
+    run("arctan_quotient_rom", __file__)
