@@ -49,8 +49,10 @@ module signal_correction #(
 
     wire signed [15:0] sin_wide = 16'(sin) <<< (16 - W);
     wire signed [15:0] cos_wide = 16'(cos) <<< (16 - W);
-    wire signed [35:0] sum = 36'(sin_part) + 36'(cos_part) + 36'sd65536;
-    wire signed [18:0] sin_half = 19'(sum >>> 17);  // rounded
+    wire signed [35:0] sum = 36'(sin_part) + 36'(cos_part);
+    // The rounding has an adder of its own: one sum of three numbers would take more cells.
+    wire signed [19:0] sin_whole = 20'(sum >>> 16);
+    wire signed [18:0] sin_half = 19'((sin_whole + 20'sd1) >>> 1);
     wire signed [16:0] cos_half = 17'((18'(cos_kept) + 18'sd1) >>> 1);
     wire               sin_fits = sin_half[18:15] == {4{sin_half[18]}};
     wire               cos_fits = cos_half[16] == cos_half[15];
