@@ -10,7 +10,7 @@ from cocotb.triggers import FallingEdge, Timer
 from tb.bench import run, start
 from tb.common.axis_setting import AxisSetting
 
-INITIAL = 0x96
+INITIAL = 0x96A5_0F3C
 
 
 async def begin(dut):
@@ -54,9 +54,9 @@ async def random_accesses_match_the_model(dut):
     for _ in range(2000):
         axis, other = random.randrange(axes), random.randrange(axes)
         write, rst = random.getrandbits(1), int(random.random() < 0.02)
-        await cycle(dut, model, axis, write, other, random.getrandbits(8), rst)
+        await cycle(dut, model, axis, write, other, random.getrandbits(32), rst)
 
 
 @pytest.mark.parametrize("axes", [1, 5, 8])
 def test_axis_setting(axes):
-    run("axis_setting", __file__, AXES=axes, WIDTH=8, INITIAL=INITIAL)
+    run("axis_setting", __file__, AXES=axes, WIDTH=32, INITIAL=INITIAL)
