@@ -49,12 +49,15 @@ module calibration_recorder #(
     logic [31:0] burst     [0:DEPTH-1];
     logic        recording;
     logic [A-1:0] kept, next;  // words recorded; address of the word to be read
-    logic [15:0] left;  // strobes to skip
+    logic [15:0] number;  // of the next strobe among decimation, from 1 on
+    logic        first;  // it is the first of them, which is kept
     logic        half;  // the earlier phase of a word has been recorded
     logic [15:0] earlier;
 
     wire         strobe = phases ? phase_valid : sampled;
-    wire         due = recording && strobe && left == '0;
+    wire         due = recording && strobe && first;
+    // A number counted up contains all bits of another one for the first time when they are equal.
+    wire         last = &(number | ~decimation);
     wire         keep = due && (!phases || half);
     wire  [15:0] sin_16 = 16'(sin) << (16 - W);
     wire  [15:0] cos_16 = 16'(cos) << (16 - W);
@@ -66,8 +69,10 @@ module calibration_recorder #(
 
     always_ff @(posedge clk) begin
         if (recording && disturbed) invalid <= 1'b1;
-        if (recording && strobe)
-            left <= left != '0 ? left - 1'b1 : decimation == '0 ? '0 : decimation - 1'b1;
+        if (recording && strobe) begin
+            number <= last ? 16'd1 : number + 1'b1;
+            first  <= last;
+        end
         if (due) begin
             half    <= phases && !half;
             earlier <= phase;
@@ -86,7 +91,8 @@ module calibration_recorder #(
             invalid   <= 1'b0;
             kept      <= '0;
             next      <= '0;
-            left      <= '0;
+            number    <= 16'd1;
+            first     <= 1'b1;
             half      <= 1'b0;
         end
         if (rst) begin
@@ -95,7 +101,8 @@ module calibration_recorder #(
             invalid   <= 1'b0;
             kept      <= '0;
             next      <= '0;
-            left      <= '0;
+            number    <= 16'd1;
+            first     <= 1'b1;
             half      <= 1'b0;
         end
     end
