@@ -75,9 +75,8 @@ module channel_monitor #(
     logic renew;  // the channel takes the place of what was subtracted
     logic [17:0] allowed;  // largest distance that is no jump
     wire negative = difference[W];
-    wire signed [W:0] inverted = negative ? difference : ~difference;  // of the size, or one less
-    wire [19:0] margin = {1'b0, limit, !negative} + 20'($signed({inverted, !negative}));
-    wire beyond = margin[19];
+    wire [W:0] steps = negative ? ~difference : difference;  // the size; one less if negative
+    wire beyond = {18'(steps), negative} > {limit, 1'b0};
     wire for_sign = step == 4'd2 || step == 4'd7;
     wire for_clip = step == 4'd3 || step == 4'd8;
     wire for_band = step == 4'd4 || step == 4'd9;
@@ -190,6 +189,44 @@ module channel_monitor #(
     assign comparator_mismatch = history.comparator_mismatch || history_q.comparator_mismatch;
     assign comparator_stuck = history.comparator_stuck || history_q.comparator_stuck;
     assign channel_missing = history.channel_missing || history_q.channel_missing;
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    logic [3:0] head;  // the difference for which the first of the places is
+    wire  [1:0] seen = {started || second, started};  // there was a sample, for history_q, history
+    wire  [1:0] minus = {sin_q[W-1], cos_q[W-1]};
+    history_t both;
+    assign head = step == '0 ? 4'd1 : step;
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        if (valid) assume ({b, a} == ~{sin[W-1], cos[W-1]});
+        if (past) begin
+            assert (!comparator_mismatch && !comparator_stuck);
+            // the further assertions make the claim inductive
+            assert (step <= 4'd11);
+            if (step != '0) assert (levels == ~minus);
+            for (int n = 0; n < 10; n++)
+            if (head + n == 1 || head + n == 2 || head + n == 6 || head + n == 7 ||
+                head + n == 12 || head + n == 13 || head + n == 17 || head + n == 18)
+                assert (places[W*n+:W] == '0);
+            if (for_sign || for_clip) assert (place_q == '0 && difference == (W+1)'(channel_q));
+            if (for_sign || for_clip) assert (channel_q == (second ? sin_q : cos_q));
+            if ((for_clip || for_band || for_jump || for_span) && sign[0])
+                assert (sign[1] == minus[second]);
+            for (int n = 0; n < 2; n++) begin
+                both = n == 0 ? history : history_q;
+                if (both.sign[0]) assert (seen[n] && both.level == !both.sign[1]);
+                if (both.sign_q[0]) assert (started);
+                if (!both.side[0]) assert (both.changes == 0 && !both.sign[0]);
+                else assert (seen[n] && both.changes <= (both.level == !both.side[1]));
+                assert (!both.comparator_mismatch && !both.comparator_stuck);
+            end
+        end
+        cover (past && for_span && crossing && second);
+        cover (past && for_span && history.turns == 1);
+    end
+`endif
 endmodule
 
 `default_nettype wire

@@ -18,7 +18,7 @@
 // model    tb/sense/lissajous_monitor.py, equal in every bit of every cycle
 // proved   a length changes only when its sector is left on the side opposite to the entry, after
 //          a sample near its middle; nothing is judged before all eight are known
-// proof    depth 46
+// proof    depth 43
 //
 // A limit of 65535 switches its check off. All results are judged by the circle that was known
 // before the sample.
@@ -88,14 +88,13 @@ module lissajous_monitor #(
         first ? N'({length, 2'b11}) :
         middle_added ? N'(middle) : N'({at_place} ^ {N{subtract}});
     wire carry = subtract || learn;
-    wire signed [N:0] total = {sum, carry} + {operand, carry};
+    wire signed [N-1:0] total = sum + operand + N'(carry);
 
     // the limit; 4 counts
     logic [17:0] limit;
     wire negative = sum[N-1];
-    wire signed [N-1:0] inverted = negative ? sum : ~sum;  // of the size, of the size - 1
-    wire [19:0] margin = {1'b0, limit, !negative} + {20'($signed({inverted, !negative}))};
-    wire beyond = margin[19];
+    wire [N-1:0] steps = negative ? ~sum : sum;  // the size; one less if negative
+    wire beyond = {19'(steps), negative} > {1'b0, limit, 1'b0};
 
     assign ready = &{known, known_q};
 
@@ -129,14 +128,14 @@ module lissajous_monitor #(
     end
 
     always_ff @(posedge clk) begin
-        if (learn && crossed) learned[{kind, sector}] <= total[R+1:2];
+        if (learn && crossed) learned[{kind, sector}] <= total[R:1];
     end
 
     always_ff @(posedge clk) begin
         done <= step == 5'd16;
         if (step != '0 || valid) begin
             step <= step == 5'd20 ? '0 : step + 1'b1;
-            sum  <= total[N:1];
+            sum  <= total;
             if (compare || learn) sum <= '0;
         end
         if (step == 5'd5) off_circle <= ready && beyond;
@@ -183,6 +182,26 @@ module lissajous_monitor #(
         end
     end
     assign offset_drift = uncentred || uncentred_q;
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    wire any = off_circle || offset_drift || unbalanced || not_in_quadrature;
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        if (past) begin
+            assert (step <= 5'd20);
+            assert (ready || !any);
+            for (int n = 0; n < 8; n++)
+            if (learned[n] != $past(learned[n])) begin
+                assert ($past(learn && started && met && side[0]) && $past({kind, sector}) == n);
+                assert ($past(kind ? quadrant : axis) == 2'(n) + $past(side));
+            end
+        end
+        if (past && !$past(rst) && ready && !$past(ready)) assert ($past(learn && crossed));
+        cover (past && met_q && side_q[0]);
+    end
+`endif
 endmodule
 
 `default_nettype wire

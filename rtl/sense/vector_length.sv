@@ -54,7 +54,6 @@ module vector_length #(
     wire [W+4:0] next =
         {remainder[W+1:0], radicand[2*W+3:2*W+2], restored} +
         {divisor ^ {(W + 4) {restored}}, restored};
-    wire [W:0] rounded = root + 1'b1;
 
     // direction
     wire [W-1:0] size = channel[W-1] ? -channel : channel;
@@ -91,7 +90,7 @@ module vector_length #(
 
         done <= step == LAST;
         if (step == LAST) begin
-            length   <= 16'(rounded[W:1]);
+            length   <= 16'(root[W:1]) + 16'(root[0]);
             axis     <= steep ? {sin_q[W-1], 1'b1} : {cos_q[W-1], 1'b0};
             quadrant <= {sin_q[W-1], sin_q[W-1] ^ cos_q[W-1]};
             tilt     <= quarters;
