@@ -91,11 +91,11 @@ module count_phase_check #(
     end
 
 `ifdef FORMAL
-    (* anyconst *)logic        alike;  // the steps are those of the count
-    logic        past = 1'b0;
-    logic [31:0] last;  // count at the last step
-    wire  [45:0] travelled_count = {count - last, 14'b0};
-    wire [D-15:0] last_q = last[D-15:0];
+    (* anyconst *)logic          alike;  // the steps are those of the count
+    logic          past = 1'b0;
+    logic [  31:0] last;  // count at the last step
+    wire  [  45:0] travelled_count = {count - last, 14'b0};
+    wire  [D-15:0] last_q = last[D-15:0];
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);

@@ -193,8 +193,8 @@ module channel_monitor #(
 `ifdef FORMAL
     logic past = 1'b0;
     logic [3:0] head;  // the difference for which the first of the places is
-    wire  [1:0] seen = {started || second, started};  // there was a sample, for history_q, history
-    wire  [1:0] minus = {sin_q[W-1], cos_q[W-1]};
+    wire [1:0] seen = {started || second, started};  // there was a sample, for history_q, history
+    wire [1:0] minus = {sin_q[W-1], cos_q[W-1]};
     history_t both;
     assign head = step == '0 ? 4'd1 : step;
     always @(posedge clk) begin
@@ -210,7 +210,7 @@ module channel_monitor #(
             if (head + n == 1 || head + n == 2 || head + n == 6 || head + n == 7 ||
                 head + n == 12 || head + n == 13 || head + n == 17 || head + n == 18)
                 assert (places[W*n+:W] == '0);
-            if (for_sign || for_clip) assert (place_q == '0 && difference == (W+1)'(channel_q));
+            if (for_sign || for_clip) assert (place_q == '0 && difference == (W + 1)'(channel_q));
             if (for_sign || for_clip) assert (channel_q == (second ? sin_q : cos_q));
             if ((for_clip || for_band || for_jump || for_span) && sign[0])
                 assert (sign[1] == minus[second]);
@@ -218,8 +218,9 @@ module channel_monitor #(
                 both = n == 0 ? history : history_q;
                 if (both.sign[0]) assert (seen[n] && both.level == !both.sign[1]);
                 if (both.sign_q[0]) assert (started);
-                if (!both.side[0]) assert (both.changes == 0 && !both.sign[0]);
-                else assert (seen[n] && both.changes <= (both.level == !both.side[1]));
+                if (!both.side[0])
+                    assert (both.changes == 0 && !both.sign[0]);
+                    else assert (seen[n] && both.changes <= (both.level == !both.side[1]));
                 assert (!both.comparator_mismatch && !both.comparator_stuck);
             end
         end

@@ -185,7 +185,7 @@ module lissajous_monitor #(
 
 `ifdef FORMAL
     logic past = 1'b0;
-    wire any = off_circle || offset_drift || unbalanced || not_in_quadrature;
+    wire  any = off_circle || offset_drift || unbalanced || not_in_quadrature;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
