@@ -14,8 +14,7 @@
 //          other channel moves by 4 sqrt(A band) at most. no_noise: the channel has the same code
 //          for `no_noise_samples` samples, moving or not, so the noise of a working ADC is
 //          missing. With 0.5 LSB of noise a code lasts 256 samples once in 10^42, with 0.2 LSB
-//          4096 samples once in 10^21; set no_noise_samples to 0 if there is less noise. A new
-//          value of it acts from the next change of the code on.
+//          4096 samples once in 10^21; set no_noise_samples to 0 if there is less noise.
 //          comparator_mismatch: three samples in a row have the same sign and are beyond
 //          `sign_threshold`, and at the middle one the comparator has the opposite sign, so the
 //          comparator may be early or late by one sample.
@@ -94,9 +93,9 @@ module channel_monitor #(
         renew = for_jump || (for_band && (beyond || !started)) || (for_span && !at_rest);
     end
 
-    // distance of this sample from the preceding one: the larger one of both channels
-    logic [W:0] distance;
-    wire  [W:0] size = negative ? -difference : difference;
+    // twice the distance of this sample from the preceding one, less one if negative: of the channel
+    // that has moved further
+    logic [W+1:0] moved;
 
     // what is known of a channel
     typedef struct packed {
@@ -139,7 +138,7 @@ module channel_monitor #(
                                         (history.stayed[1] && beyond && history.recent != '0));
         now.same = same_code ? history.same + 1'b1 : '0;
         now.no_noise = same_code && no_noise_samples != '0 &&
-            (history.no_noise || now.same == no_noise_samples);
+            (history.no_noise || now.same >= no_noise_samples);
         {now.sign_q, now.sign} = {history.sign, sign};
         if (sign[0]) now.side = sign;
         now.comparator_mismatch = sure && history.level == sign[1];
@@ -157,7 +156,7 @@ module channel_monitor #(
         if (valid && step == '0) begin
             {sin_q, cos_q} <= {sin, cos};
             levels <= {b, a};
-            allowed <= 18'({distance, 1'b0}) + 18'(jump);
+            allowed <= 18'(jump) + 18'(moved) + 18'(moved[0]);
         end
         if (valid || step != '0) step <= step == 4'd11 ? '0 : step + 1'b1;
         if (step != '0) begin
@@ -171,7 +170,7 @@ module channel_monitor #(
         if (for_jump) begin
             same_code <= started && difference == '0;
             jumped <= (followed && beyond) || (second && jumped);
-            if (!second || size > distance) distance <= size;
+            if (!second || {steps, negative} > moved) moved <= {steps, negative};
         end
         if (for_span) {history_q, history} <= {now, history_q};
         if (step == 4'd11) {followed, started} <= {started, 1'b1};

@@ -60,7 +60,7 @@ class Channel:
         same_code = (channel == self.last) & self.started
         self.same = np.where(same_code, (self.same + 1) % 65536, 0)
         self.no_noise = (
-            same_code & (no_noise_samples != 0) & (self.no_noise | (self.same == no_noise_samples))
+            same_code & (no_noise_samples != 0) & (self.no_noise | (self.same >= no_noise_samples))
         )
 
         sign = np.where(size > sign_threshold, np.sign(channel), 0)

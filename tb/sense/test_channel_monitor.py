@@ -148,6 +148,15 @@ async def the_same_code_for_no_noise_samples_is_no_noise_until_it_changes(dut):
 
 
 @cocotb.test()
+async def a_new_no_noise_samples_acts_at_the_next_sample(dut):
+    for sine in (False, True):
+        model = await begin(dut, sine, no_noise_samples=0)
+        assert not any(await rows(dut, model, *[(7, n) for n in range(20)]))
+        model.settings["no_noise_samples"] = dut.no_noise_samples.value = 8
+        assert await rows(dut, model, (7, 50), (8, 51), (8, 52)) == [["no_noise"], [], []]
+
+
+@cocotb.test()
 async def a_signal_without_noise_is_good_while_no_noise_samples_is_0(dut):
     for sine in (False, True):
         model = await begin(dut, sine, clip_level=100, band=2, span=50, sign_threshold=20)
