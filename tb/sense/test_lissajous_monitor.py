@@ -84,12 +84,12 @@ async def turn(dut, model, lengths, times=1, back=False):
 async def latency_is_17_to_done_and_the_results_and_19_or_21_to_ready(dut):
     risen = set()
     for first in range(8):
-        model = await begin(dut, tolerance=5)
+        await begin(dut, tolerance=5)
         for k in range(first, first + 14):
             axis, quadrant, tilt = TURN[k % 8]
             dut.valid.value, dut.length.value = 1, 100
             dut.axis.value, dut.quadrant.value, dut.tilt.value = axis, quadrant, tilt
-            before, done, off, ready = int(dut.ready.value), [], [], []
+            before, done, ready = int(dut.ready.value), [], []
             for _ in range(PERIOD):
                 await RisingEdge(dut.clk)
                 await FallingEdge(dut.clk)

@@ -68,7 +68,7 @@ class Watch:
             await self.sample(*distort(size * np.cos(angle), size * np.sin(angle)), gap=gap)
 
     async def rest(self, cycles):
-        """Cycles without an input; those in which nothing may change are not looked at one by one."""
+        """Cycles without an input; those in which nothing may change are passed at once."""
         end = self.elapsed + cycles
         while self.elapsed < end:
             await self.cycle()
