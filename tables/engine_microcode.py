@@ -8,8 +8,9 @@ opposite); without terms the line passes acc on. The sum goes to acc, divided by
 undivided to a word. Effects and jobs are in the tables below.
 
 The engine works on three lines at once: it fetches one while it reads the operand of the line
-before and adds up the line before that. So what a line changes is known DISTANCE lines later. Where
-the program needs it sooner, the assembler inserts lines that only pass acc on.
+before and adds up the line before that. So what a line changes is known DISTANCE lines later, and
+one line sooner to a condition, which is tested one cycle after its line is fetched. Where the
+program needs it sooner, the assembler inserts lines that only pass acc on.
 """
 
 import re
@@ -26,8 +27,8 @@ MEMORY = RTL / "engine_memory.sv"
 PROOF = RTL / "engine_regions.sv"
 
 DISTANCE = 3  # lines from a change to the first line that can read it
-SIGN_DISTANCE = 2  # from a test to the first jump that depends on it
-SEEN_DISTANCE = 4  # from a change of the axis to what is seen of it
+TEST_DISTANCE = 2  # from a change to the first line whose condition depends on it
+SEEN_DISTANCE = 1  # more, from a change of the axis to what is seen of it
 LINES = 1024
 FINISH = 12  # cycles between two axes, the scan and the tick, at most
 
@@ -368,10 +369,9 @@ near:   acc - total
         acc - two31 -> measured         ; give velocity
 
 # a start at a time: this tick, if the time has come
-                                        ; unless armed make
+        one                             ; y, unless armed make
         now
         acc - start_at                  ; x_low
-        one                             ; y
         product
         acc - two31                     ; test
                                         ; unless negative make
@@ -381,8 +381,7 @@ near:   acc - total
                                         ; set moving
 # the target makes the step that was prepared
 make:                                   ; unless moving made
-                                        ; unless ready made
-        moved
+        moved                           ; unless ready made
         acc + step -> moved             ; if final end
         acc >> 24
         acc + anchor -> target          ; give target
@@ -393,8 +392,7 @@ make:                                   ; unless moving made
         change >> 24
         acc - top                       ; below
         acc + range                     ; above
-        acc - two31 -> target_acceleration
-                                        ; goto made
+        acc - two31 -> target_acceleration ; goto made
 # the last step rounds to the LSB, a half up
 end:    acc + half_step >> 24           ; stand
         acc + anchor -> target          ; give target
@@ -493,8 +491,7 @@ lower:  part
         - output_limit                  ; set limited_down
 neither: acc -> sum
 
-sample: acc -> base
-                                        ; if closed section
+sample: acc -> base                     ; if closed section
         open_command                    ; x
         two16                           ; y
         product -> base
@@ -619,10 +616,9 @@ chosen: rate                            ; if halting divide
 toward: acc - override -> distance      ; goto law
 
 # a controlled stop: slope becomes the acceleration in whole increments
-stop:                                   ; set halting
+stop:   - stop_deceleration             ; test, set halting
                                         ; if stopping law
                                         ; set stopping
-        - limit                         ; test
                                         ; set first
                                         ; unless negative at_end
                                         ; goto choose
@@ -795,7 +791,7 @@ prepared: flags -> context              ; give state
 
 @dataclass
 class Line:
-    """A line of the program, and what of the engine it changes and reads."""
+    """A line of the program, and what of the engine it changes, reads and tests."""
 
     text: str
     label: str = ""
@@ -810,6 +806,7 @@ class Line:
     action: str = ""
     changes: set[str] = field(default_factory=set)
     reads: set[str] = field(default_factory=set)
+    tests: set[str] = field(default_factory=set)
 
     def loads(self) -> bool:
         return self.effect[0] in "xy" or self.effect == "divide"
@@ -858,7 +855,7 @@ BANKED = {
 
 
 def dependences(line: Line) -> None:
-    """Fill in what a line changes at its end and what it reads when it is fetched."""
+    """Fill in what a line changes at its end, what it reads when it is fetched and what it tests."""
     word, operand = line.word, line.operand
     if word:
         line.changes.add(word)
@@ -881,13 +878,13 @@ def dependences(line: Line) -> None:
     if operand in ("position", "elapsed"):
         line.reads.add("seen")
     condition = line.condition
-    line.reads.add("queue" if condition in QUEUE else condition)
+    line.tests.add("queue" if condition in QUEUE else condition)
     if condition.endswith("_seen") or CONDITIONS[condition] >= CONDITIONS["stepped"]:
-        line.reads.add("seen")
+        line.tests.add("seen")
     if condition == "asked":
-        line.reads.add("seen")
+        line.tests.add("seen")
     if condition == "wrapped":
-        line.reads.add("axis")
+        line.tests.add("axis")
     action = line.action
     if line.effect in ("test", "upward"):
         line.changes.add("negative" if line.effect == "test" else "upward")
@@ -937,6 +934,18 @@ def successors(lines: list[Line]) -> list[list[int]]:
     return found
 
 
+def distance_of(line: Line, later: Line) -> int:
+    """How many lines after a line a later one may come at the earliest, if that depends on it."""
+    read, tested = line.changes & later.reads, line.changes & later.tests
+    needed = [DISTANCE + SEEN_DISTANCE * ("seen" in read)] * bool(read)
+    needed += [TEST_DISTANCE + SEEN_DISTANCE * ("seen" in tested)] * bool(tested)
+    if "product" in later.operand and "earlier_" not in later.text and line.loads():
+        needed.append(DISTANCE)
+    if later.effect == "along" and "upward" in line.changes:
+        needed.append(2)
+    return max(needed, default=0)
+
+
 def missing(lines: list[Line]) -> tuple[int, int] | None:
     """(number of a line, lines that are missing before it), of the first that comes too soon."""
     before: list[list[int]] = [[] for _ in lines]
@@ -946,24 +955,11 @@ def missing(lines: list[Line]) -> tuple[int, int] | None:
                 before[m].append(n)
     for n, line in enumerate(lines):
         reached = {n}
-        for distance in range(1, SEEN_DISTANCE):
+        for distance in range(1, DISTANCE + SEEN_DISTANCE):
             reached = {b for r in reached for b in before[r]}
-            for b in reached:
-                change = lines[b].changes & line.reads
-                if distance >= SIGN_DISTANCE:
-                    change -= {"negative"}
-                if change == {"negative"}:
-                    return n, SIGN_DISTANCE - distance
-                if "seen" in change:
-                    return n, SEEN_DISTANCE - distance
-                if distance >= DISTANCE:
-                    continue
-                if "product" in line.operand and "earlier_" not in line.text and lines[b].loads():
-                    change = {"product"}
-                if line.effect == "along" and "upward" in lines[b].changes and distance == 1:
-                    return n, 1
-                if change:
-                    return n, DISTANCE - distance
+            needed = max((distance_of(lines[b], line) for b in reached), default=0)
+            if needed > distance:
+                return n, needed - distance
     return None
 
 

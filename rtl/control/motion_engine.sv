@@ -154,7 +154,6 @@ module motion_engine #(
     wire        [ 6:0] operand = code[12:6];
     wire        [72:0] wide = {acc, 1'b1} + {term, sign_e};
     wire        [71:0] sum = wide[72:1];
-    wire               negative_now = effect_e == TEST ? sum[71] : negative;
     wire               off = level[2] && level[3];
 
     engine_sequencer #(
@@ -180,7 +179,7 @@ module motion_engine #(
             1'b0,
             axis_asked,
             2'd0,
-            negative_now,
+            negative,
             3'd0,
             flags
         }),
@@ -336,7 +335,7 @@ module motion_engine #(
         term     <= source == HALVE ? {term[71], term[71:1]} : from ^ {72{minus}};
 
         // it is added
-        negative <= negative_now;
+        if (effect_e == TEST) negative <= sum[71];
         if (effect_e == UPWARD) flags[UPWARDS] <= sum[71];
         if (!with_acc || (effect_e == BELOW && !sum[71]) || (effect_e == ABOVE && sum[71]))
             acc <= '0;
