@@ -18,8 +18,8 @@ module engine_regions (
         if (line >= 10'd45 && line <= 10'd50) region = 3'd2;  // serve
         if (line >= 10'd53 && line <= 10'd62) region = 3'd1;  // shared
         if (line >= 10'd89 && line <= 10'd94) region = 3'd1;  // shared
-        if (line >= 10'd109 && line <= 10'd622) region = 3'd2;  // serve
-        if (line >= 10'd623 && line <= 10'd625) region = 3'd3;  // leave
+        if (line >= 10'd109 && line <= 10'd632) region = 3'd2;  // serve
+        if (line >= 10'd633 && line <= 10'd635) region = 3'd3;  // leave
     end
 endmodule
 

@@ -96,21 +96,21 @@ module motion_engine #(
     localparam int A = $clog2(AXES) + WORD_W;
 
     // as in tables/engine_microcode.py
-    localparam [3:0] TEST = 4'd1, BELOW = 4'd2, ABOVE = 4'd3, SHIFT_8 = 4'd4, SHIFT_24 = 4'd5;
-    localparam [3:0] X = 4'd6, X_LOW = 4'd7, X_HIGH = 4'd8, Y = 4'd9, Y_LOW = 4'd10;
-    localparam [3:0] Y_HIGH = 4'd11, DIVIDE = 4'd12, UPWARD = 4'd13, ALONG = 4'd14;
-    localparam [3:0] PRODUCT = 4'd1, PRODUCT_HIGH = 4'd2, PRODUCT_LOW = 4'd3, HALVE = 4'd4;
-    localparam [3:0] POSITION = 4'd5, ELAPSED = 4'd6, PERIOD = 4'd7, NOW = 4'd8, FLAGS = 4'd9;
-    localparam [3:0] SHIFT_BY = 4'd10;
+    localparam [3:0] TEST = 4'd1, BELOW = 4'd2, ABOVE = 4'd3, SHIFT_8 = 4'd4, X = 4'd5;
+    localparam [3:0] X_LOW = 4'd6, X_HIGH = 4'd7, Y = 4'd8, Y_LOW = 4'd9, DIVIDE = 4'd10;
+    localparam [3:0] UPWARD = 4'd11, ALONG = 4'd12;
+    localparam int PRODUCT = 1, PRODUCT_HIGH = 2, PRODUCT_LOW = 3, HALVE = 4, POSITION = 5;
+    localparam int ELAPSED = 6, PERIOD = 7, NOW = 8, FLAGS = 9, SHIFT_BY = 10, SETTING = 11;
     localparam [7:0] LOAD_CONTEXT = 8'h20, SAMPLE = 8'h23;
     localparam [7:0] STAND = 8'h24, POP = 8'h26, PUSH = 8'h27, EMPTY = 8'h28;
     localparam [7:0] BOOTED = 8'h29, FIRST_FILTER = 8'h2A, NEXT_FILTER = 8'h2B;
-    localparam [2:0] SET = 3'd2, CLEAR = 3'd3, GIVE = 3'd4, DONE = 3'd6;
+    localparam [1:0] SET_OR_CLEAR = 2'd1;
+    localparam [2:0] GIVE = 3'd4, DONE = 3'd6;
     localparam [2:0] COMMAND = 3'd5, STEPS = 3'd6;
     localparam int HALTING = 19, LIMITED_UP = 10, LIMITED_DOWN = 11, REBASED = 13;
     localparam int UPWARDS = 14;
     localparam [15:0] MOTION = 16'b0000_0000_1111_1110;  // the flags that STAND clears
-    localparam [5:0] NOWHERE = 6'h3F;
+    localparam [5:0] OF_SETTING = 6'h37, NOWHERE = 6'h3F;
 
     // the axis that is served, and its flags; 16 and above are cleared with each axis
     wire  [ 2:0] axis;
@@ -126,7 +126,8 @@ module motion_engine #(
     logic axis_asked, axis_gains;
     // time
     logic [31:0] seen_now;
-    logic [23:0] elapsed, period;
+    logic [23:0] elapsed;  // cycles since the last tick
+    logic [23:0] period;
 
     // what the axes show
     localparam int SEEN = 88;  // bits that an axis shows
@@ -135,14 +136,12 @@ module motion_engine #(
     wire  [   SEEN*4-1:0] of_four = axis[2] ? of_eight[SEEN*4+:SEEN*4] : of_eight[0+:SEEN*4];
     wire  [   SEEN*2-1:0] of_two = axis[1] ? of_four[SEEN*2+:SEEN*2] : of_four[0+:SEEN*2];
     wire  [     SEEN-1:0] of_axis = axis[0] ? of_two[SEEN+:SEEN] : of_two[0+:SEEN];
-    wire  [         23:0] elapsed_now = tick ? '0 : elapsed == '1 ? elapsed : elapsed + 1'b1;
 
     // the lines in work: fetched, and its operand is being read; then the operand is there; then it
     // is added
     wire  [         35:0] code;
     wire  [          7:0] action_e;
-    logic [          3:0] source;  // of the operand: 0 memory or nothing
-    logic                 reads;  // the operand is in memory
+    logic [         15:0] source;  // of the operand: the bit of its number; none: memory
     logic [5:0] word, word_e;
     logic with_acc, sign, sign_e;
     logic [3:0] effect, effect_e;
@@ -191,52 +190,34 @@ module motion_engine #(
         .cycles
     );
 
-    // addresses of words
+    // addresses of words; where nothing is read from memory, a word that is 0
     logic [7:0] read_word, write_word;
     wire [3:0] tail = head + queued[3:0];
 
     always_comb begin
         casez (operand)
-            7'b0??_????: read_word = operand[6] ? '0 : {2'd0, operand[5:0]};
+            7'b0??_????: read_word = {2'd0, operand[5:0]};
             7'b100_????: read_word = {2'b01, operand[3:0], 2'b11};
             7'b101_????: read_word = {2'b10, filter[1:0], operand[3:0]};
             7'b110_0???: read_word = {2'b01, head, operand[1:0]};
-            default:     read_word = {4'd0, flags[HALTING], operand[2:0]};
+            7'b110_1???: read_word = {3'd0, flags[HALTING], 2'b00, operand[1:0]};
+            default:     read_word = 8'h7F;
         endcase
         casez (word_e)
-            6'b11_00??: write_word = {4'd0, flags[HALTING], 1'b0, word_e[1:0]};
+            OF_SETTING:
+            write_word = {setting_word[6], 1'b0, setting_word[6] ? setting_filter : setting_word[5:4],
+                setting_word[3:0]};
+            6'b11_00??: write_word = {3'd0, flags[HALTING], 2'b00, word_e[1:0]};
             6'b11_01??: write_word = {2'b01, tail, word_e[1:0]};
             6'b11_1???: write_word = {2'b10, filter[1:0], word_e[3:0]};
             default:    write_word = {2'd0, word_e};
         endcase
     end
 
-    wire              write;
-    wire [WORD_W+2:0] write_at;
-    wire [      71:0] written;
+    wire writes_setting = word_e == OF_SETTING;
+    wire write = word_e != NOWHERE && (!writes_setting || setting_waits);
+    wire [2:0] write_axis = writes_setting ? setting_axis : axis;
 
-    engine_settings #(
-        .WORD_W(WORD_W)
-    ) u_settings (
-        .clk,
-        .rst,
-        // settings
-        .setting_write,
-        .setting_axis,
-        .setting_word,
-        .setting_filter,
-        .setting,
-        .waits       (setting_waits),
-        // the engine
-        .operand,
-        .write       (word_e != NOWHERE),
-        .write_at    ({axis, write_word[WORD_W-1:0]}),
-        .word        (sum),
-        // to the memory
-        .write_out   (write),
-        .write_out_at(write_at),
-        .word_out    (written)
-    );
     engine_memory #(
         .AXES  (AXES),
         .WORD_W(WORD_W)
@@ -245,8 +226,8 @@ module motion_engine #(
         .read_at (A'({axis, read_word[WORD_W-1:0]})),
         .stored,
         .write,
-        .write_at(write_at[A-1:0]),
-        .word    (written)
+        .write_at(A'({write_axis, write_word[WORD_W-1:0]})),
+        .word    (sum)
     );
 
     // the operand
@@ -258,28 +239,19 @@ module motion_engine #(
     );
 
     wire         minus = sign ^ (effect == ALONG && !flags[UPWARDS]);
-    logic [71:0] from;
-    logic [47:0] outside;
+    wire  [71:0] multiplied = ({72{source[PRODUCT]}} & {{2{product[69]}}, product})
+        | ({72{source[PRODUCT_HIGH]}} & {product[39:0], 32'd0})
+        | ({72{source[PRODUCT_LOW]}} & {{34{product[69]}}, product[69:32]});
+    wire  [47:0] outside = ({48{source[POSITION]}} & axis_position)
+        | ({48{source[ELAPSED]}} & {24'd0, axis_elapsed}) | ({48{source[PERIOD]}} & {24'd0, period})
+        | ({48{source[NOW]}} & {16'd0, seen_now})
+        | ({48{source[FLAGS]}} & {23'd0, queued, head, flags[15:0]})
+        | ({48{source[SHIFT_BY]}} & shift_by);
+    wire  [71:0] from = stored | multiplied | {{24{outside[47]}}, outside}
+        | ({72{source[SETTING]}} & {{8{setting[63]}}, setting});
 
-    always_comb begin
-        case (source)
-            POSITION: outside = axis_position;
-            ELAPSED:  outside = {24'd0, axis_elapsed};
-            PERIOD:   outside = {24'd0, period};
-            NOW:      outside = {16'd0, seen_now};
-            FLAGS:    outside = {23'd0, queued, head, flags[15:0]};
-            SHIFT_BY: outside = shift_by;
-            default:  outside = '0;
-        endcase
-        case (source)
-            PRODUCT:      from = {{2{product[69]}}, product};
-            PRODUCT_HIGH: from = {product[39:0], 32'd0};
-            PRODUCT_LOW:  from = {{34{product[69]}}, product[69:32]};
-            default:      from = reads ? stored : {{24{outside[47]}}, outside};
-        endcase
-    end
-
-    // requests
+    // flags and requests
+    wire sets = action_e[7:6] == SET_OR_CLEAR;
     wire [20:0] named = 21'd1 << action_e[4:0];
     wire [ 6:0] done = action_e[7:5] == DONE ? 7'd1 << action_e[2:0] : '0;
 
@@ -289,7 +261,7 @@ module motion_engine #(
             .rst,
             .tick,
             .sample(action_e == SAMPLE && axis == 3'(n) && !busy),
-            .elapsed(elapsed_now),
+            .elapsed,
             .position(position[48*n+:48]),
             .stepped(stepped[n]),
             .downward(downward[n]),
@@ -317,7 +289,7 @@ module motion_engine #(
     end
 
 
-    wire unused = &{1'b0, code, wide[0], requested[6], read_word, write_word, write_at};
+    wire unused = &{1'b0, code, wide[0], requested[6], read_word, write_word, write_axis};
 
     always_ff @(posedge clk) begin
         // the operand is read
@@ -325,14 +297,13 @@ module motion_engine #(
         with_acc <= code[5];
         sign     <= code[4];
         effect   <= code[3:0];
-        source   <= operand[6:4] == 3'd7 ? operand[3:0] : '0;
-        reads    <= operand[6:4] != 3'd7;
+        source   <= operand[6:4] == 3'd7 ? 16'd1 << operand[3:0] : '0;
 
         // the operand is there
         word_e   <= word;
-        sign_e   <= source == HALVE ? sign : minus;
+        sign_e   <= source[HALVE] ? sign : minus;
         effect_e <= effect;
-        term     <= source == HALVE ? {term[71], term[71:1]} : from ^ {72{minus}};
+        term     <= source[HALVE] ? {term[71], term[71:1]} : from ^ {72{minus}};
 
         // it is added
         if (effect_e == TEST) negative <= sum[71];
@@ -340,15 +311,13 @@ module motion_engine #(
         if (!with_acc || (effect_e == BELOW && !sum[71]) || (effect_e == ABOVE && sum[71]))
             acc <= '0;
         else if (effect_e != DIVIDE || !sum[71])
-            acc <= effect_e == SHIFT_8 ? {{8{sum[71]}}, sum[71:8]} :
-                   effect_e == SHIFT_24 ? {{24{sum[71]}}, sum[71:24]} : sum;
+            acc <= effect_e == SHIFT_8 ? {{8{sum[71]}}, sum[71:8]} : sum;
         case (effect_e)
             X:       x <= sum[34:0];
             X_LOW:   x <= {3'd0, sum[31:0]};
             X_HIGH:  x <= sum[66:32];
             Y:       y <= sum[34:0];
             Y_LOW:   y <= {3'd0, sum[31:0]};
-            Y_HIGH:  y <= sum[66:32];
             DIVIDE:  y <= {y[33:0], !sum[71]};
             default: ;
         endcase
@@ -368,8 +337,7 @@ module motion_engine #(
             NEXT_FILTER:  filter <= filter + 1'b1;
             default:      ;
         endcase
-        if (action_e[7:5] == SET) flags <= flags | named;
-        if (action_e[7:5] == CLEAR) flags <= flags & ~named;
+        for (int n = 0; n <= 20; n++) if (sets && named[n]) flags[n] <= !action_e[5];
         result_valid <= action_e[7:5] == GIVE;
         if (action_e[7:5] == GIVE) begin
             result      <= sum[47:0];
@@ -386,17 +354,21 @@ module motion_engine #(
         {axis_gains, axis_asked, level, requested, axis_elapsed, axis_position} <= of_axis;
 
         // time
-        elapsed <= elapsed_now;
         if (tick) begin
-            period   <= elapsed == '1 ? elapsed : elapsed + 1'b1;
+            elapsed  <= 24'd1;
+            period   <= elapsed;
             seen_now <= now;
-        end
+        end else if (elapsed != '1) elapsed <= elapsed + 1'b1;
+
+        // the setting that waits
+        setting_waits <= setting_write || (setting_waits && !writes_setting);
 
         if (rst) begin
-            {source, reads} <= '0;
+            source <= '0;
             {word, word_e} <= '1;
             {effect, effect_e} <= '0;
-            {filter, flags, elapsed, period, ready, result_valid} <= '0;
+            {filter, flags, period, ready, result_valid, setting_waits} <= '0;
+            elapsed <= 24'd1;
         end
     end
 endmodule
