@@ -38,11 +38,11 @@ module engine_sequencer #(
 
     wire [35:0] next_code, target_code;
     logic [9:0] next_line, target_line;
-    logic unless;  // the line before jumps unless its condition holds
-    logic [5:0] condition;  // of the line before
-    logic ticking;  // the axes are served because of a tick
-    logic [4:0] count;  // how often a line is still repeated
-    logic [7:0] read_action;  // action or target of the line whose operand is there
+    logic        unless;  // the line before jumps unless its condition holds
+    logic [ 5:0] condition;  // of the line before
+    logic        ticking;  // the axes are served because of a tick
+    logic [ 4:0] count;  // how often a line is still repeated
+    logic [ 7:0] read_action;  // action or target of the line whose operand is there
     logic [63:0] all;
 
     always_comb begin

@@ -2,8 +2,8 @@
 // motion_engine -- compute velocity, profile, servo and motor steps of all axes of a node in one
 // datapath, one axis after the other at each servo tick.
 //
-// latency   `cycles` at most from tick to the last result: 76 and 365 for each axis without
-//           filters, 484 with two filters, 592 with four. The results of an axis come before the
+// latency   `cycles` at most from tick to the last result: 70 and 365 for each axis without
+//           filters, 480 with two filters, 584 with four. The results of an axis come before the
 //           next step of its profile is prepared, which is the last third of its time.
 // rate      a tick when the one before has been served, else overrun is reported and what the axes
 //           show is not certain; between two ticks one request of an axis per 20 to 70 cycles
@@ -15,7 +15,8 @@
 // method    One adder of 72 bits, one multiplier of 35 bits and one memory, controlled by the
 //           microcode of tables/engine_microcode.py. A line is fetched, its operand is read in the
 //           next cycle and added in the one after. The words of an axis, its queue, its settings
-//           and its filters are in the memory; the flags are loaded with each axis.
+//           and its filters are in the memory; the flags are loaded with each axis. What comes from
+//           outside and what comes from memory are combined by OR: the one that is not meant is 0.
 // behaviour All axes are sampled in the cycle of the tick, and starts that were requested before it
 //           begin at it. A start makes the profile move at once; the first tick only prepares.
 //           Requests are served between two ticks, in the order shift, set_target_to_position,
@@ -30,6 +31,8 @@
 //           velocity and 3 the measured velocity in 2^-16 period/tick, 4 following error in 2^-16
 //           period (flag: above following_limit), 5 command (flag: at its limit), 6 target in 2^-16
 //           motor step (flag: restart there), 7 underrun.
+//           A setting is written within 100 cycles between two ticks, and before the next axis is
+//           served during a tick.
 // limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units:
 //           gains 2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16 command, integral_limit
 //           2^-24 command, coefficients 2^-32, stop_deceleration 2^-40 period/tick2, trim_scale
@@ -56,7 +59,7 @@ module motion_engine #(
     input  wire         [        6:0] setting_word,            // number of its word
     input  wire         [        1:0] setting_filter,          // number of its filter
     input  wire signed  [       63:0] setting,                 // value
-    output logic                      setting_waits,           // level: it is not written yet
+    output logic                      setting_waits,           // level: it must stay as it is
     // the axes
     input  wire         [48*AXES-1:0] position,                // 2^-16 period, of each axis
     input  wire         [   AXES-1:0] stepped,                 // strobes: position made a step
@@ -214,8 +217,8 @@ module motion_engine #(
         endcase
     end
 
-    wire writes_setting = word_e == OF_SETTING;
-    wire write = word_e != NOWHERE && (!writes_setting || setting_waits);
+    wire       writes_setting = word_e == OF_SETTING;
+    wire       write = word_e != NOWHERE && (!writes_setting || setting_waits);
     wire [2:0] write_axis = writes_setting ? setting_axis : axis;
 
     engine_memory #(
@@ -238,7 +241,7 @@ module motion_engine #(
         .product
     );
 
-    wire         minus = sign ^ (effect == ALONG && !flags[UPWARDS]);
+    wire minus = sign ^ (effect == ALONG && !flags[UPWARDS]);
     wire  [71:0] multiplied = ({72{source[PRODUCT]}} & {{2{product[69]}}, product})
         | ({72{source[PRODUCT_HIGH]}} & {product[39:0], 32'd0})
         | ({72{source[PRODUCT_LOW]}} & {{34{product[69]}}, product[69:32]});
@@ -253,7 +256,7 @@ module motion_engine #(
     // flags and requests
     wire sets = action_e[7:6] == SET_OR_CLEAR;
     wire [20:0] named = 21'd1 << action_e[4:0];
-    wire [ 6:0] done = action_e[7:5] == DONE ? 7'd1 << action_e[2:0] : '0;
+    wire [6:0] done = action_e[7:5] == DONE ? 7'd1 << action_e[2:0] : '0;
 
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         engine_inputs u_inputs (

@@ -295,7 +295,7 @@ async def a_setting_that_comes_during_a_tick_is_written_before_the_next_axis_is_
         await engine.until(lambda: not int(dut.busy.value), 5000)
         await engine.idle(20)
         engine.got = [[] for _ in engine.models]
-        for n, model in enumerate(engine.models):
+        for n in range(engine.axes):
             assert memory_word(dut, n, OPERANDS["segment_ticks"]) == cycles, f"axis {n}"
     assert 20 < max(waited) <= most
 
