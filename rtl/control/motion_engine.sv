@@ -207,9 +207,6 @@ module motion_engine #(
             default:     read_word = 8'h7F;
         endcase
         casez (word_e)
-            OF_SETTING:
-            write_word = {setting_word[6], 1'b0, setting_word[6] ? setting_filter : setting_word[5:4],
-                setting_word[3:0]};
             6'b11_00??: write_word = {3'd0, flags[HALTING], 2'b00, word_e[1:0]};
             6'b11_01??: write_word = {2'b01, tail, word_e[1:0]};
             6'b11_1???: write_word = {2'b10, filter[1:0], word_e[3:0]};
@@ -217,9 +214,11 @@ module motion_engine #(
         endcase
     end
 
-    wire       writes_setting = word_e == OF_SETTING;
-    wire       write = word_e != NOWHERE && (!writes_setting || setting_waits);
-    wire [2:0] write_axis = writes_setting ? setting_axis : axis;
+    wire        writes_setting = word_e == OF_SETTING;
+    wire        write = word_e != NOWHERE && (!writes_setting || setting_waits);
+    wire [ 1:0] setting_bank = setting_word[6] ? setting_filter : setting_word[5:4];
+    wire [ 7:0] setting_at = {setting_word[6], 1'b0, setting_bank, setting_word[3:0]};
+    wire [10:0] write_at = writes_setting ? {setting_axis, setting_at} : {axis, write_word};
 
     engine_memory #(
         .AXES  (AXES),
@@ -229,7 +228,7 @@ module motion_engine #(
         .read_at (A'({axis, read_word[WORD_W-1:0]})),
         .stored,
         .write,
-        .write_at(A'({write_axis, write_word[WORD_W-1:0]})),
+        .write_at(A'({write_at[10:8], write_at[WORD_W-1:0]})),
         .word    (sum)
     );
 
@@ -292,7 +291,7 @@ module motion_engine #(
     end
 
 
-    wire unused = &{1'b0, code, wide[0], requested[6], read_word, write_word, write_axis};
+    wire unused = &{1'b0, code, wide[0], requested[6], read_word, write_at};
 
     always_ff @(posedge clk) begin
         // the operand is read
