@@ -875,7 +875,7 @@ QUEUE = {"empty", "full"}
 
 
 def dependences(line: Line) -> None:
-    """Fill in what a line changes at its end, what it reads when it is fetched and what it tests."""
+    """Fill in what a line changes at its end, reads when it is fetched, and tests."""
     word, operand = line.word, line.operand
     if word:
         line.changes.add(word)
