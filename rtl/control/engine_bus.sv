@@ -77,14 +77,15 @@ module engine_bus #(
         .filter_value
     );
 
-    wire there = filter_value ? FILTERS != 0 && filter_at[4:3] <= 2'(FILTERS - 1) : of_engine;
-    wire take = stores && of_axis && there;
+    wire        built = {1'b0, filter_at[4:3]} + 3'd1 <= 3'(FILTERS);
+    wire        there = filter_value ? built : of_engine;
+    wire        take = stores && of_axis && there;
     // 65536 is the largest fraction of the feed override; nothing else has bit 16 and these places
-    wire largest = places == 5'd8 && value[16];
+    wire        largest = places == 5'd8 && value[16];
     wire [15:0] fraction = largest ? '0 : value[15:0];
 
-    wire scaled = scales && left == 5'd1;
-    wire written = !scales && !setting_write && !setting_waits;
+    wire        scaled = scales && left == 5'd1;
+    wire        written = !scales && !setting_write && !setting_waits;
 
     assign hold  = scales || setting_write || setting_waits || pushes || !ready;
     assign waits = hold || |{push, pending, moves, moved};
