@@ -93,8 +93,8 @@ module channel_monitor #(
         renew = for_jump || (for_band && (beyond || !started)) || (for_span && !at_rest);
     end
 
-    // Of the channel that has moved further since the preceding sample: twice the distance, one less
-    // if it is negative.
+    // Of the channel that has moved further since the preceding sample: twice the distance, one
+    // less if it is negative.
     logic [W+1:0] moved;
 
     // what is known of a channel
