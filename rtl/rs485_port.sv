@@ -40,7 +40,7 @@ module rs485_port #(
     wire receive_present, receive_read, receive_good, receive_command, receive_overrun;
     wire [7:0] received_data, filtered_data, data, receive_data, receive_free;
     // transmit
-    wire to_send, send_ready, send_command, sending, driver_requested, tx_level;
+    wire to_send, send_ready, send_command, sending, driver_requested, tx_level, transmit_tick;
     wire transmit_written, transmit_command, transmit_expired, transmit_overrun;
     wire [7:0] send_data, transmit_data, transmit_free;
     // CRC
@@ -161,12 +161,13 @@ module rs485_port #(
         .ninth        (send_command),
         .tx           (tx_level),
         .driver_enable(driver_requested),
-        .busy         (sending)
+        .busy         (sending),
+        .tick         (transmit_tick)
     );
     transmit_timeout u_timeout (
         .clk,
         .rst,
-        .bit_time,
+        .tick         (transmit_tick),
         .requested    (driver_requested),
         .driver_enable(rs485_driver_enable),
         .expired      (transmit_expired)

@@ -43,7 +43,7 @@ module relay_bridge #(
     wire received, ninth, framing_error, own, own_command, passed, command, good;
     wire answer_valid, answer_ready;
     wire [7:0] character, own_data, data, answer;
-    wire unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending;
+    wire unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending, unused_tick;
 
     uart_rx u_receiver (
         .clk,
@@ -124,11 +124,13 @@ module relay_bridge #(
         .ninth(1'b0),
         .tx,
         .driver_enable,
-        .busy (unused_sending)
+        .busy (unused_sending),
+        .tick (unused_tick)
     );
 
     wire unused = &{
-        1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending
+        1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending,
+        unused_tick
     };
 endmodule
 
