@@ -7,7 +7,8 @@
 // rate      one read per cycle, one clear in 2 cycles; events of one counter must be
 //           2 * COUNTERS + 1 cycles apart, and 2 more for each read and 3 more for each clear
 //           meanwhile, or may be lost
-// behaviour Counter 0 is not there: its place in the memory stays 0 from power-up on. The places
+// behaviour Counter 0 is not there: its place in the memory is 0 at power-up and never written, and
+//           a count is cleared with it. The places
 //           are served in turn, two cycles each: a count is read, then raised if there was an event
 //           before the turn of place 0. A count stops at its largest value. A clear drops what was
 //           counted; an event that waits counts from 0 on. In the cycle after a clear there must be
@@ -15,9 +16,9 @@
 //           in which there must be no access.
 // model     tb/registers/event_counters.py, equal in every bit of every cycle
 // proved    Whatever is read and cleared: count and waiting events together are the number of
-//           events since the last clear and those that waited then, if no event comes while the
-//           one before it waits.
-// proof     depth 14, COUNTERS = 4, W = 3
+//           events since the last clear and those that waited then, if no event comes while
+//           the one before it waits for the turn of place 0.
+// proof     depth 18, COUNTERS = 4, W = 3
 `default_nettype none
 
 module event_counters #(
@@ -53,10 +54,11 @@ module event_counters #(
     wire access = read || clear || clearing;
     wire next = raising && !access;
     wire [W:0] raised = {1'b0, count} + (W + 1)'(!clearing && !fresh);
-    wire store = clearing || (next && (fresh || in_turn[1]));
+    wire [A-1:0] stored_at = clearing ? cleared : place;
+    wire store = (clearing || (next && (fresh || in_turn[1]))) && !raised[W] && stored_at != '0;
 
     always_ff @(posedge clk) begin
-        if (store && !raised[W]) memory[clearing?cleared : place] <= raised[W-1:0];
+        if (store) memory[stored_at] <= raised[W-1:0];
         count <= memory[read?number : clear||fresh?A'(0) : place];
     end
 
@@ -87,9 +89,9 @@ module event_counters #(
     logic         asked;  // its count was read in the cycle before
     logic [W-1:0] answer;  // count in that cycle
     wire          listed = place != '0 && place <= observed && in_turn[observed-place+1'b1];
-    wire          waits = waiting[observed] || listed;
+    wire  [  W:0] waits = (W + 1)'(waiting[observed]) + (W + 1)'(listed);
     wire  [W-1:0] held = clearing && cleared == observed ? '0 : memory[observed];
-    wire  [  W:0] known = {1'b0, held} + (W + 1)'(waits);
+    wire  [  W:0] known = {1'b0, held} + waits;
     wire  [W-1:0] reached = known[W] ? '1 : known[W-1:0];
     always @(posedge clk) begin
         past <= 1'b1;
@@ -98,9 +100,10 @@ module event_counters #(
         if (fresh) assume (!clear && !read && events == '0);
         assume (!(clearing && (read || clear)));
         assume (!(read && clear));
-        if (events[observed]) assume (!waits);
+        if (events[observed]) assume (!waiting[observed]);
         if (rst) events_so_far <= '0;
-        else if (clear && number == observed) events_so_far <= W'(waits || events[observed]);
+        else if (clear && number == observed) 
+            events_so_far <= waits[W-1:0] + W'(events[observed]);
         else if (!(&events_so_far)) events_so_far <= events_so_far + W'(events[observed]);
         asked  <= !rst && read && number == observed;
         answer <= held;
@@ -114,8 +117,8 @@ module event_counters #(
             if (raising) assert (!clearing);
             if (asked) assert (count == answer);
         end
-        cover (past && !rst && asked && count == W'(2));
-        cover (past && !rst && listed && raising && read);
+        cover (past && !rst && !fresh && store && next);
+        cover (past && !rst && !fresh && raising && in_turn[1] && read);
     end
 `endif
 endmodule

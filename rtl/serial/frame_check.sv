@@ -129,14 +129,14 @@ module frame_check #(
         if (call) taken <= 8'd0;
         else if (word) taken <= taken + 1'b1;
         if (word && taken == 0) length <= data;
-        if (rst || frame_good || frame_bad) open <= 1'b0;
+        if (rst || frame_good || (frame_bad && !running)) open <= 1'b0;
         if (call && data[5] && !rst) open <= 1'b1;
         if (past && !$past(rst)) begin
             assert (running == (state != IDLE));
             if (running) assert ((taken == 0) == (state == LENGTH));
             if (state == BODY || state == CRC) assert (length >= 1 && length <= 8'(LONGEST));
             if (state == BODY) assert (taken >= 1 && {1'b0, left} + taken == length + 8'd1);
-            if (state == BODY) assert (left != 0);
+            if (state == BODY) assert (left != 0 && taken <= length);
             if (state == CRC) assert (of_crc <= 8'd3 && left == 7'd0 - of_crc[6:0]);
             if (ended && passes && since < 4'd10)
                 assert (!running && taken == length + 8'd5 && !command);
@@ -144,11 +144,11 @@ module frame_check #(
             if (good && valid) assert (ended && !running);
             assert (!(frame_good && frame_bad));
             if (sync) assert (frame_good && to_all);
-            assert (open || !(frame_good || (frame_bad && !$past(call))));
+            if (frame_good || frame_bad) assert (open);
             if (running) assert (open);
             if (open) assert (running || broken || (ended && passes && since <= 4'd9));
-            cover (frame_bad && ended);
-            cover (broken && command);
+            cover (valid && command);
+            cover (broken);
         end
     end
 `endif

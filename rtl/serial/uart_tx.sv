@@ -99,8 +99,10 @@ module uart_tx #(
             if (state != SEND) assert (tx);
             if (state == LEAD) assert (number >= 4'd14);
             if (state == SEND) assert (number <= STOP);
-            // the bits of the character that are left, then ones
-            if (state == SEND && number == STOP) assert (tx && &shifted);
+            // behind the bits that are left there are ones
+            for (int n = 0; n < 9; n++)
+            if (state == SEND && n + int'(number) >= 8 + NINTH) assert (shifted[n]);
+            if (state == SEND && number == STOP) assert (tx);
             cover (state == SEND);
         end
     end

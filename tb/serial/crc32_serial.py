@@ -10,20 +10,19 @@ CYCLES = 8  # after that of the byte
 
 class Crc32Serial:
     def __init__(self):
-        self.crc, self.left, self.checked, self.wrong = 0, 0, 0, None
+        self.crc, self.left, self.checked, self.wrong = 0, 0, 0, 0
 
     def step(self, start, valid, data, check, rst=0):
         done = self.left == 1
         self.left = max(self.left - 1, 0)
         if start or rst:
-            self.crc, self.left, self.checked = 0, 0, 0
-            self.wrong = 0 if start else None
+            self.crc, self.left, self.checked, self.wrong = 0, 0, 0, 0
         if valid and not rst:
             self.left = CYCLES
             if check:
                 expected = self.crc.to_bytes(4, "little")[self.checked]
                 self.checked += 1
-                self.wrong = None if self.wrong is None else int(self.wrong or data != expected)
+                self.wrong = int(self.wrong or data != expected)
             else:
                 self.crc = zlib.crc32(bytes([data]), self.crc)
         ready = not self.left
