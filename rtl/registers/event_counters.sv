@@ -8,12 +8,12 @@
 //           2 * COUNTERS + 1 cycles apart, and 2 more for each read and 3 more for each clear
 //           meanwhile, or may be lost
 // behaviour Counter 0 is not there: its place in the memory is 0 at power-up and never written, and
-//           a count is cleared with it. The places
-//           are served in turn, two cycles each: a count is read, then raised if there was an event
-//           before the turn of place 0. A count stops at its largest value. A clear drops what was
-//           counted; an event that waits counts from 0 on. In the cycle after a clear there must be
-//           no read of the same counter. After rst the counts are cleared in 2 * COUNTERS cycles,
-//           in which there must be no access.
+//           a count is cleared with it. The places are served in turn, two cycles each: a count is
+//           read, then raised if there was an event before the turn of place 0, which lasts until
+//           there is one. A count stops at its largest value. A clear drops what was counted; an
+//           event that waits counts from 0 on. In the cycle after a clear there must be no read of
+//           the same counter. After rst the counts are cleared in 2 * COUNTERS cycles, in which
+//           there must be no access.
 // model     tb/registers/event_counters.py, equal in every bit of every cycle
 // proved    Whatever is read and cleared: count and waiting events together are the number of
 //           events since the last clear and those that waited then, if no event comes while
@@ -51,8 +51,9 @@ module event_counters #(
     logic clearing;  // the count of `cleared` becomes 0
     logic [A-1:0] cleared;
 
+    wire idle = place == '0 && waiting == '0 && !fresh;
     wire access = read || clear || clearing;
-    wire next = raising && !access;
+    wire next = raising && !access && !idle;
     wire [W:0] raised = {1'b0, count} + (W + 1)'(!clearing && !fresh);
     wire [A-1:0] stored_at = clearing ? cleared : place;
     wire store = (clearing || (next && (fresh || in_turn[1]))) && !raised[W] && stored_at != '0;
@@ -63,7 +64,7 @@ module event_counters #(
     end
 
     always_ff @(posedge clk) begin
-        raising  <= !access && !raising;
+        raising  <= !access && (!raising || idle);
         clearing <= clear;
         cleared  <= number;
         if (next) begin

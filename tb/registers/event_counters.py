@@ -21,7 +21,8 @@ class EventCounters:
         access = read or clear or self.cleared is not None
         if self.cleared is not None:
             self.counts[self.cleared] = 0
-        if self.raising and not access:
+        idle = self.place == 0 and not self.waiting and not self.fresh
+        if self.raising and not access and not idle:
             here = self.place
             if self.fresh:
                 self.counts[here] = 0
@@ -31,7 +32,7 @@ class EventCounters:
                 self.in_turn, self.waiting = self.waiting, set()
             self.place = (here + 1) % self.counters
             self.fresh = self.fresh and self.place != 0
-        self.raising = not access and not self.raising
+        self.raising = not access and (idle or not self.raising)
         self.cleared = number if clear else None
         self.waiting = self.waiting | events
         if rst:

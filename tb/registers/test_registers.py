@@ -55,8 +55,8 @@ class Bus:
         """The memory takes its first values; the inputs are idle."""
         await RisingEdge(self.dut.ready)
         await FallingEdge(self.dut.clk)
-        # so do the counts in a memory, which are served in turn: 2048 cycles are whole rounds
-        for _ in range(2 * self.block.counters if self.block.counted else 1):
+        # so do the counts in a memory
+        for _ in range(2 * self.block.counters + 1 if self.block.counted else 1):
             self.model.step(0, 0, 0, 0, self.inputs)
 
     def pins(self, inputs):
