@@ -55,3 +55,9 @@ class FrameCheck:
         if valid:
             self.left, self.result = CYCLES - 1, (passed, ended, good, sync)
         return *out[:3], int(out[3] or broken), out[4]
+
+    def word(self, valid, data, command):
+        """A word and the cycles that it takes: (passed, good, bad, sync)."""
+        seen = [self.step(valid and not n, data, command, 0) for n in range(CYCLES)]
+        passed, good, _, _, sync = seen[-1]
+        return passed, int(passed and good), sum(bad for *_, bad, _ in seen), sync
