@@ -4,8 +4,8 @@
 //
 // latency  1 cycle from start to waits; waits lasts `cycles` + 1 cycles, or ends 1 cycle after wake
 // rate     a start while waits is high begins the time again
-// behaviour  While wake is high, a start has no effect: the soft core cannot miss an event that came
-//          just before it began to wait. `cycles` must stay as it is during the wait.
+// behaviour  While wake is high, a start has no effect: the soft core cannot miss an event that
+//          came just before it began to wait. `cycles` must stay as it is during the wait.
 // model    tb/cpu/core_wait.py, equal in every bit of every cycle
 // proved   waits is low in the cycle after wake or rst, and never high for longer than the time of
 //          the last start.
@@ -32,7 +32,7 @@ module core_wait #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic         past = 1'b0;
     logic [W-1:0] since;  // cycles since the last start
     always @(posedge clk) begin
         past <= 1'b1;

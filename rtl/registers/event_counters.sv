@@ -103,8 +103,7 @@ module event_counters #(
         assume (!(read && clear));
         if (events[observed]) assume (!waiting[observed]);
         if (rst) events_so_far <= '0;
-        else if (clear && number == observed) 
-            events_so_far <= waits[W-1:0] + W'(events[observed]);
+        else if (clear && number == observed) events_so_far <= waits[W-1:0] + W'(events[observed]);
         else if (!(&events_so_far)) events_so_far <= events_so_far + W'(events[observed]);
         asked  <= !rst && read && number == observed;
         answer <= held;

@@ -43,7 +43,8 @@ module relay_bridge #(
     wire received, ninth, framing_error, own, passed, good;
     wire answer_valid, answer_ready;
     wire [7:0] character, answer;
-    wire unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending, unused_tick;
+    wire unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync;
+    wire unused_sending, unused_tick;
 
     uart_rx u_receiver (
         .clk,

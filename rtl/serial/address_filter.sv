@@ -49,7 +49,8 @@ module address_filter (
             assert (open == called);
             if (valid) begin
                 assert ($past(valid_in));
-                if ($past(ninth)) assert ($past(data_in[7:4]) == 4'h1 || $past(data_in[7:4]) == 4'h2);
+                if ($past(ninth))
+                    assert ($past(data_in[7:4]) == 4'h1 || $past(data_in[7:4]) == 4'h2);
                 if ($past(ninth))
                     assert ($past(data_in[3:0]) == $past(address) || $past(data_in) == 8'h20);
                 if (!$past(ninth)) assert ($past(called));

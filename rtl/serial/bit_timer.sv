@@ -9,7 +9,8 @@
 // limits    bit_time from 8 cycles up; 8 cycles are added to less. If bit_time becomes shorter in
 //           mid-count, the next tick may come 8192 cycles later.
 // model     tb/serial/bit_timer.py, equal in every bit of every cycle
-// proved    A tick comes bit_time / 8 cycles after a restart or the tick before, rounded down or up.
+// proved    A tick comes bit_time / 8 cycles after a restart or the tick before, rounded down or
+//           up.
 // proof     depth 12
 `default_nettype none
 
@@ -35,7 +36,7 @@ module bit_timer (
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic        past = 1'b0;
     logic [13:0] since;  // cycles since the last restart or tick
     always @(posedge clk) begin
         past <= 1'b1;

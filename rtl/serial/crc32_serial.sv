@@ -52,8 +52,8 @@ module crc32_serial (
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
-    logic [31:0] before;  // crc before the first byte with check
+    logic        past = 1'b0;
+    logic [31:0] expected;  // crc before the first byte with check
     logic [31:0] compared;  // the bits compared since then
     logic [ 5:0] bits;  // their number
     always @(posedge clk) begin
@@ -64,7 +64,7 @@ module crc32_serial (
         if (valid && check) assume (bits != 6'd32 && bits[2:0] == 3'd0 && !start);
         if (valid && !check) assume (bits == '0 || start);
         if (busy && check) begin
-            if (bits == '0) before <= crc;
+            if (bits == '0) expected <= crc;
             compared[bits[4:0]] <= data[number[2:0]];
             bits                <= bits + 6'd1;
         end
@@ -72,8 +72,8 @@ module crc32_serial (
         if (past) begin
             assert (bits[2:0] == (busy && check ? number[2:0] : 3'd0) && bits <= 6'd32);
             if (busy && !check || bits == '0) assert (bits == '0 && !wrong);
-            if (bits != '0) assert (remainder == ~before >> bits);
-            if (bits != '0) assert (wrong == (((compared ^ before) << (6'd32 - bits)) != '0));
+            if (bits != '0) assert (remainder == ~expected >> bits);
+            if (bits != '0) assert (wrong == (((compared ^ expected) << (6'd32 - bits)) != '0));
             cover (wrong);
         end
         cover (busy && remainder[31:24] == 8'hED);

@@ -44,7 +44,7 @@ module frame_check #(
         CRC
     } state_t;
 
-    state_t        state;
+    state_t       state;
     logic   [6:0] left;  // bytes of the body still to come; 0, -1, -2, -3: of the CRC-32
     logic         passes;  // the word passes
     logic         checked;  // the word is a byte of the CRC-32
@@ -121,7 +121,11 @@ module frame_check #(
         since <= valid_in ? 4'd1 : since + 4'(since != 4'd15);
         if (rst) since <= 4'd15;
         if (past && since < 4'd10)
-            assume (!valid_in && !framing_error && data == $past(data) && command == $past(command));
+            assume (!valid_in && !framing_error && data == $past(
+                data
+            ) && command == $past(
+                command
+            ));
         if (rst) running <= 1'b0;
         else if (call) running <= data[5];
         else if (framing_error) running <= 1'b0;

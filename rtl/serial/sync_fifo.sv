@@ -59,13 +59,14 @@ module sync_fifo #(
     end
 
 `ifdef FORMAL
-    // Any one place is followed from a push to the pop: its word comes out in its turn and unchanged.
+    // Any one place is followed from a push to the pop: its word comes out in its turn and
+    // unchanged.
     (* anyconst *)logic [A-1:0] chosen;
     logic         past = 1'b0;
     logic         waiting;  // a word is in the chosen place
     logic [W-1:0] value;
     wire  [  A:0] stored = (A + 1)'(DEPTH) - free;
-    wire  [A-1:0] before = chosen - to_read;  // words before that of the chosen place
+    wire  [A-1:0] ahead = chosen - to_read;  // words before that of the chosen place
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -81,7 +82,7 @@ module sync_fifo #(
             assert (stored <= (A + 1)'(DEPTH) && stored[A-1:0] == to_write - to_read);
             if (present) assert (stored != 0);
             if (stored != 0 && !present) assert ($past(drop) || (stored == 1 && $past(push)));
-            assert (waiting == ({1'b0, before} < stored));
+            assert (waiting == ({1'b0, ahead} < stored));
             if (waiting) assert (memory[chosen] == value);
             if (waiting && present && to_read == chosen) assert (out == value);
             assert (overrun == ($past(push) && $past(stored) == (A + 1)'(DEPTH)));

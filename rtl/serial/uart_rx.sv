@@ -42,25 +42,25 @@ module uart_rx #(
         RELEASE
     } state_t;
 
-    state_t       state;
-    logic         rx_q;  // the level that is sampled: the edge is half a cycle old on average
-    logic   [1:0] seen;  // the two samples before
+    state_t             state;
+    logic               rx_q;  // the level that is sampled: the edge is half a cycle old on average
+    logic   [      1:0] seen;  // the two samples before
     // eighths of a bit since the start bit began, 3 more: the last sample of bit n is at 8 n + 7
-    logic   [6:0] eighth;
-    logic   [8:0] shifted;
-    wire          tick;
+    logic   [      6:0] eighth;
+    logic   [7+NINTH:0] shifted;
+    wire                tick;
 
     // number of the bit: 0 start, 1..8 data, 9 ninth, STOP
-    wire    [3:0] bit_number = eighth[6:3];
-    wire          first = bit_number == 4'd0;
-    wire          last = bit_number == STOP;
-    wire          agreed = eighth[2:0] == 3'd6 && seen[0] == rx_q;
-    wire          decide = state == RECEIVE && tick && (&eighth[2:0] || (last && agreed));
-    wire          level = (seen[0] & seen[1]) | (seen[0] & rx_q) | (seen[1] & rx_q);
+    wire    [      3:0] bit_number = eighth[6:3];
+    wire                first = bit_number == 4'd0;
+    wire                last = bit_number == STOP;
+    wire                agreed = eighth[2:0] == 3'd6 && seen[0] == rx_q;
+    wire                decide = state == RECEIVE && tick && (&eighth[2:0] || (last && agreed));
+    wire                level = (seen[0] & seen[1]) | (seen[0] & rx_q) | (seen[1] & rx_q);
 
     assign busy  = state != IDLE;
-    assign data  = shifted[8-NINTH-:8];
-    assign ninth = NINTH != 0 && shifted[8];
+    assign data  = shifted[7:0];
+    assign ninth = NINTH != 0 && shifted[7+NINTH];
 
     bit_timer u_timer (
         .clk,
@@ -78,7 +78,7 @@ module uart_rx #(
         else if (tick) eighth <= eighth + 7'd1;
         rx_q <= rx;
         if (tick) seen <= {seen[0], rx_q};
-        if (decide && !first && !last) shifted <= {level, shifted[8:1]};
+        if (decide && !first && !last) shifted <= {level, shifted[7+NINTH:1]};
 
         case (state)
             IDLE: if (!rx) state <= RECEIVE;

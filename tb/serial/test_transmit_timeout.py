@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""transmit_timeout: the exact tick, that the driver stays off, and noise against the model.
-"""
+"""transmit_timeout: the exact tick, that the driver stays off, and noise against the model."""
 
 import random
 
