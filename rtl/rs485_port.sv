@@ -37,11 +37,11 @@ module rs485_port #(
     wire [15:0] watchdog_time;
     // receive
     wire rx_level, rx, received, ninth, framing_error, start_glitch, receiving, line_break;
-    wire filtered, filtered_command, checked, command, good, frame_good, frame_bad;
+    wire filtered, checked, good, frame_good, frame_bad;
     wire receive_present, receive_read, receive_good, receive_command, receive_overrun;
-    wire [7:0] received_data, filtered_data, data, receive_data, receive_free;
+    wire [7:0] received_data, receive_data, receive_free;
     // transmit
-    wire to_send, send_ready, send_command, sending, driver_requested, tx_level;
+    wire to_send, send_ready, send_command, sending, driver_requested, tx_level, transmit_tick;
     wire transmit_written, transmit_command, transmit_expired, transmit_overrun;
     wire [7:0] send_data, transmit_data, transmit_free;
     // CRC
@@ -93,20 +93,16 @@ module rs485_port #(
         .valid_in(received),
         .data_in (received_data),
         .ninth,
-        .valid   (filtered),
-        .data    (filtered_data),
-        .command (filtered_command)
+        .valid   (filtered)
     );
     frame_check u_check (
         .clk,
         .rst,
-        .valid_in  (filtered),
-        .data_in   (filtered_data),
-        .command_in(filtered_command),
+        .valid_in(filtered),
+        .data    (received_data),
+        .command (ninth),
         .framing_error,
-        .valid     (checked),
-        .data,
-        .command,
+        .valid   (checked),
         .good,
         .frame_good,
         .frame_bad,
@@ -120,7 +116,7 @@ module rs485_port #(
         .clk,
         .rst,
         .push   (checked),
-        .in     ({good, command, data}),
+        .in     ({good, ninth, received_data}),
         .pop    (receive_read),
         .present(receive_present),
         .out    ({receive_good, receive_command, receive_data}),
@@ -164,27 +160,31 @@ module rs485_port #(
         .ninth        (send_command),
         .tx           (tx_level),
         .driver_enable(driver_requested),
-        .busy         (sending)
+        .busy         (sending),
+        .tick         (transmit_tick)
     );
     transmit_timeout u_timeout (
         .clk,
         .rst,
-        .bit_time,
+        .tick         (transmit_tick),
         .requested    (driver_requested),
         .driver_enable(rs485_driver_enable),
         .expired      (transmit_expired)
     );
-    // the soft core needs more than 5 cycles for a byte
-    crc32_stream #(
-        .BITS(2)
-    ) u_crc (
+    // the soft core needs more than 9 cycles for a byte, and the register keeps it
+    /* verilator lint_off PINCONNECTEMPTY */
+    crc32_serial u_crc (
         .clk,
         .rst,
         .start(crc_start),
         .valid(crc_byte_written),
         .data (crc_byte),
+        .check(1'b0),
+        .done (),
+        .wrong(),
         .crc
     );
+    /* verilator lint_on PINCONNECTEMPTY */
 
     bus_registers u_registers (
         .clk,

@@ -235,9 +235,9 @@ class Block:
 
     @property
     def counted_events(self) -> str:
-        """The strobes of those counters, each at the place of its word."""
+        """The strobes of those counters, each at the place of its word; place 0 has none."""
         ports = {word: f.port for word, f in self.counted}
-        places = range(self.counters - 1, -1, -1)
+        places = range(self.counters - 1, 0, -1)
         return "{" + ", ".join(ports.get(place, "1'b0") for place in places) + "}"
 
     @property

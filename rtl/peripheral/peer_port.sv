@@ -35,7 +35,7 @@ module peer_port #(
         };
     end else begin : g_built
         wire rx, received, ninth, start_glitch, receiving;
-        wire to_send, send_ready, driver_enable, transmit_overrun;
+        wire to_send, send_ready, driver_enable, transmit_overrun, transmit_tick;
         wire [7:0] received_data, send_data;
         wire [6:0] receive_free;
 
@@ -101,10 +101,12 @@ module peer_port #(
             .ninth(1'b0),
             .tx   (tx_pin),
             .driver_enable,
-            .busy (sending)
+            .busy (sending),
+            .tick (transmit_tick)
         );
         wire unused = &{
-            1'b0, ninth, start_glitch, receiving, receive_free, transmit_overrun, driver_enable
+            1'b0, ninth, start_glitch, receiving, receive_free, transmit_overrun, driver_enable,
+            transmit_tick
         };
     end
 endmodule

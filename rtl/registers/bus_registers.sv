@@ -97,7 +97,6 @@ module bus_registers (
             frames_good,
             1'b0,
             1'b0,
-            1'b0,
             1'b0
         }),
         .read(get && counter),

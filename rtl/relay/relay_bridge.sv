@@ -40,10 +40,11 @@ module relay_bridge #(
     input  wire               pass_done,      // strobe: pass_data is new
     input  wire        [ 7:0] pass_data       // byte of the chip
 );
-    wire received, ninth, framing_error, own, own_command, passed, command, good;
+    wire received, ninth, framing_error, own, passed, good;
     wire answer_valid, answer_ready;
-    wire [7:0] character, own_data, data, answer;
-    wire unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending;
+    wire [7:0] character, answer;
+    wire unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync;
+    wire unused_sending, unused_tick;
 
     uart_rx u_receiver (
         .clk,
@@ -64,9 +65,7 @@ module relay_bridge #(
         .valid_in(received),
         .data_in (character),
         .ninth,
-        .valid   (own),
-        .data    (own_data),
-        .command (own_command)
+        .valid   (own)
     );
     frame_check #(
         .LONGEST(LONGEST)
@@ -74,12 +73,10 @@ module relay_bridge #(
         .clk,
         .rst,
         .valid_in  (own),
-        .data_in   (own_data),
-        .command_in(own_command),
+        .data      (character),
+        .command   (ninth),
         .framing_error,
         .valid     (passed),
-        .data,
-        .command,
         .good,
         .frame_good(unused_good),
         .frame_bad (unused_bad),
@@ -90,9 +87,9 @@ module relay_bridge #(
     ) u_requests (
         .clk,
         .rst,
-        .valid(passed),
-        .data,
-        .command,
+        .valid  (passed),
+        .data   (character),
+        .command(ninth),
         .good,
         .events,
         .levels,
@@ -124,11 +121,13 @@ module relay_bridge #(
         .ninth(1'b0),
         .tx,
         .driver_enable,
-        .busy (unused_sending)
+        .busy (unused_sending),
+        .tick (unused_tick)
     );
 
     wire unused = &{
-        1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending
+        1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending,
+        unused_tick
     };
 endmodule
 

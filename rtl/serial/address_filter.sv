@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // address_filter -- pass only the words of an RS-485 bus that are meant for this node.
 //
-// latency   1 cycle from a word at the input to the word at the output
+// latency   1 cycle from valid_in to valid
 // rate      one word per cycle
 // behaviour All nodes examine a word with the 9th bit set. `00 D5D4 address` with D5D4 01 or 10 and
 //           the node's own address passes, and opens the gate for the words that follow. `00 10
 //           0000` is meant for all nodes. Any other word with the 9th bit set closes the gate.
+//           The word itself stays at its source (uart_rx), for all that read it.
 // source    S0: multiprocessor mode of the 8031 (SM2)
 // model     tb/serial/address_filter.py, equal in every bit of every cycle
 // proved    Nothing passes but commands for this node, and data words after one with no other
@@ -19,9 +20,7 @@ module address_filter (
     input  wire        valid_in,  // strobe: data_in and ninth are a word
     input  wire  [7:0] data_in,   // 8 data bits of the word
     input  wire        ninth,     // level: the word is a command byte, for any node
-    output logic       valid,     // strobe: data and command are a word for this node
-    output logic [7:0] data,      // 8 data bits of the word
-    output logic       command    // level: the word is a command byte; with valid
+    output logic       valid      // strobe: the word is for this node
 );
     logic open;  // data words pass
 
@@ -29,9 +28,7 @@ module address_filter (
     wire  own = (is_command && data_in[3:0] == address) || data_in == 8'h20;
 
     always_ff @(posedge clk) begin
-        valid   <= valid_in && (ninth ? own : open);
-        data    <= data_in;
-        command <= ninth;
+        valid <= valid_in && (ninth ? own : open);
         if (valid_in && ninth) open <= own;
         if (rst) begin
             valid <= 1'b0;
@@ -51,13 +48,15 @@ module address_filter (
         if (past && !$past(rst)) begin
             assert (open == called);
             if (valid) begin
-                assert ($past(valid_in) && data == $past(data_in) && command == $past(ninth));
-                if (command) assert (data[7:4] == 4'h1 || data[7:4] == 4'h2);
-                if (command) assert (data[3:0] == $past(address) || data == 8'h20);
-                if (!command) assert ($past(called));
+                assert ($past(valid_in));
+                if ($past(ninth))
+                    assert ($past(data_in[7:4]) == 4'h1 || $past(data_in[7:4]) == 4'h2);
+                if ($past(ninth))
+                    assert ($past(data_in[3:0]) == $past(address) || $past(data_in) == 8'h20);
+                if (!$past(ninth)) assert ($past(called));
             end
-            cover (valid && command);
-            cover (valid && !command && data == 8'h55);
+            cover (valid && $past(ninth));
+            cover (valid && !$past(ninth) && $past(data_in) == 8'h55);
             cover (!open && $past(open));
         end
     end

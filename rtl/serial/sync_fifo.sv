@@ -2,8 +2,8 @@
 // sync_fifo -- queue words in one clock domain, first in, first out. The oldest word is at the
 // output until it is popped.
 //
-// latency   2 cycles from push to present when the queue is empty
-// rate      one push and one pop per cycle
+// latency   2 cycles from push to present when the queue is empty, and from pop to the next word
+// rate      one push per cycle, one pop in 2 cycles
 // method    A ring in a memory with one write port and one clocked read port.
 // model     tb/serial/sync_fifo.py, equal in every bit of every cycle
 // proved    No word is lost, duplicated, invented or overtaken. A refused word is reported.
@@ -35,62 +35,63 @@ module sync_fifo #(
 
     // a row that is read while it is written is not shown
     (* no_rw_check, ram_style = STYLE *) logic [W-1:0] memory[0:DEPTH-1];
-    // counts of words; one bit more than an address distinguishes full from empty
-    logic [A:0] written, read;
+    logic [A-1:0] to_write, to_read;  // places of the next word to be stored, of the oldest word
 
-    wire       full = free == '0;
-    wire       take = push && !full;
-    wire [A:0] read_next = read + (A + 1)'(pop && present);
+    wire full = free == '0;
+    wire empty = free[A];
+    wire take = push && !full;
+    wire drop = pop && present;
 
     always_ff @(posedge clk) begin
-        if (take) memory[written[A-1:0]] <= in;
-        out <= memory[read_next[A-1:0]];
+        if (take) memory[to_write] <= in;
+        out <= memory[to_read];
     end
 
     always_ff @(posedge clk) begin
-        present <= written != read_next;
+        present <= !empty && !drop;
         overrun <= push && full;
-        read    <= read_next;
-        written <= written + (A + 1)'(take);
-        free    <= free + (A + 1)'(pop && present) - (A + 1)'(take);
+        if (take) to_write <= to_write + 1'b1;
+        if (drop) to_read <= to_read + 1'b1;
+        if (take != drop) free <= free + {{A{take}}, 1'b1};  // one less, or one more
         if (rst) begin
-            present <= 1'b0;
-            overrun <= 1'b0;
-            read    <= '0;
-            written <= '0;
-            free    <= (A + 1)'(DEPTH);
+            present  <= 1'b0;
+            overrun  <= 1'b0;
+            to_write <= '0;
+            to_read  <= '0;
+            free     <= (A + 1)'(DEPTH);
         end
     end
 
 `ifdef FORMAL
-    // Any one word, the `chosen`-th, is followed from its push to its pop: it comes out in its turn
-    // and unchanged.
-    (* anyconst *)logic [  A:0] chosen;
+    // Any one place is followed from a push to the pop: its word comes out in its turn and
+    // unchanged.
+    (* anyconst *)logic [A-1:0] chosen;
     logic         past = 1'b0;
-    logic         waiting;  // the chosen word is in the queue
+    logic         waiting;  // a word is in the chosen place
     logic [W-1:0] value;
-    wire  [  A:0] stored = written - read;
+    wire  [  A:0] stored = (A + 1)'(DEPTH) - free;
+    wire  [A-1:0] ahead = chosen - to_read;  // words before that of the chosen place
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         if (rst) waiting <= 1'b0;
         else begin
-            if (take && written == chosen) begin
+            if (take && to_write == chosen) begin
                 waiting <= 1'b1;
                 value   <= in;
             end
-            if (pop && present && read == chosen) waiting <= 1'b0;
+            if (drop && to_read == chosen) waiting <= 1'b0;
         end
         if (past && !$past(rst)) begin
-            assert (stored <= (A + 1)'(DEPTH) && free == (A + 1)'(DEPTH) - stored);
+            assert (stored <= (A + 1)'(DEPTH) && stored[A-1:0] == to_write - to_read);
             if (present) assert (stored != 0);
-            if (stored != 0 && !present) assert (stored == 1 && $past(push));
-            assert (waiting == ((A + 1)'(chosen - read) < stored));
-            if (waiting) assert (memory[chosen[A-1:0]] == value);
-            if (waiting && present && read == chosen) assert (out == value);
+            if (stored != 0 && !present) assert ($past(drop) || (stored == 1 && $past(push)));
+            assert (waiting == ({1'b0, ahead} < stored));
+            if (waiting) assert (memory[chosen] == value);
+            if (waiting && present && to_read == chosen) assert (out == value);
             assert (overrun == ($past(push) && $past(stored) == (A + 1)'(DEPTH)));
-            cover (pop && present && push && read == chosen);
-            cover (present && read == chosen && chosen == 3);
+            cover (drop && push && to_read == chosen);
+            cover (present && to_read == chosen && chosen == 3);
         end
     end
 `endif

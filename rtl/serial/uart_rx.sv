@@ -2,14 +2,15 @@
 // uart_rx -- receive the characters of a UART: start bit, 8 data bits LSB first, a 9th bit if there
 // is one, stop bit.
 //
-// latency   2 cycles at most between valid and the middle of the stop bit; valid comes 1/16 bit
+// latency   2 cycles at most between valid and the middle of the stop bit; valid comes 1/8 bit
 //           later if the first two samples of the stop bit differ.
 // rate      characters without any gap
-// method    Each bit is the majority of three samples, 1/16 bit apart, around its middle. The stop
+// method    Each bit is the majority of three samples, 1/8 bit apart, around its middle. The stop
 //           bit is decided as soon as two samples agree, so that the start bit of a faster sender
 //           is not missed.
-// limits    bit_time from 8 cycles up; less counts as 8. From 16 cycles up the two ends may differ
-//           by 4 % of the bit time.
+// behaviour data and ninth stay as they are for two bit times from valid on.
+// limits    bit_time from 8 cycles up; 8 cycles are added to less. From 16 cycles up the two ends
+//           may differ by 4 % of the bit time.
 // source    S0: the 9th bit marks command bytes
 // model     tb/serial/uart_rx.py, equal in every bit of every cycle
 // proved    A start bit ends once: as a character, as a framing error, or as a glitch.
@@ -41,53 +42,46 @@ module uart_rx #(
         RELEASE
     } state_t;
 
-    state_t        state;
-    logic   [19:0] left;  // 1/16 cycle until the next sample
-    logic   [ 1:0] sample;  // number within the bit: 0, 1, 2
-    logic   [ 1:0] seen;  // samples 0 and 1
+    state_t             state;
+    logic               rx_q;  // the level that is sampled: the edge is half a cycle old on average
+    logic   [      1:0] seen;  // the two samples before
+    // eighths of a bit since the start bit began, 3 more: the last sample of bit n is at 8 n + 7
+    logic   [      6:0] eighth;
+    logic   [7+NINTH:0] shifted;
+    wire                tick;
+
     // number of the bit: 0 start, 1..8 data, 9 ninth, STOP
-    logic   [ 3:0] bit_number;
-    logic   [ 8:0] shifted;
+    wire    [      3:0] bit_number = eighth[6:3];
+    wire                first = bit_number == 4'd0;
+    wire                last = bit_number == STOP;
+    wire                agreed = eighth[2:0] == 3'd6 && seen[0] == rx_q;
+    wire                decide = state == RECEIVE && tick && (&eighth[2:0] || (last && agreed));
+    wire                level = (seen[0] & seen[1]) | (seen[0] & rx_q) | (seen[1] & rx_q);
 
-    wire    [19:0] whole = |bit_time[19:7] ? bit_time : 20'd128;
-    // between samples: 1/16 bit, at least 1 cycle
-    wire    [19:0] spread = |whole[19:8] ? {4'd0, whole[19:4]} : 20'd16;
-    wire           now = left < 20'd16;
-    wire           first = bit_number == 4'd0;
-    wire           last = bit_number == STOP;
-    wire           agreed = sample == 2'd1 && seen[0] == rx;
-    wire           decide = state == RECEIVE && now && (sample == 2'd2 || (last && agreed));
-    wire           level = agreed ? rx : (seen[0] & seen[1]) | (seen[0] & rx) | (seen[1] & rx);
+    assign busy  = state != IDLE;
+    assign data  = shifted[7:0];
+    assign ninth = NINTH != 0 && shifted[7+NINTH];
 
-    assign busy = state != IDLE;
+    bit_timer u_timer (
+        .clk,
+        .bit_time,
+        .restart(state == IDLE),
+        .tick
+    );
 
     always_ff @(posedge clk) begin
         valid         <= decide && last && level;
         framing_error <= decide && last && !level;
         start_glitch  <= decide && first && level;
 
-        // 24: rounding, and the edge is half a cycle old on average
-        if (state == IDLE) left <= {1'b0, whole[19:1]} - spread - 20'd24;
-        else if (!now) left <= left - 20'd16;
-        else left <= left - 20'd16 + (sample == 2'd2 ? whole - {spread[18:0], 1'b0} : spread);
-
-        if (state != RECEIVE) sample <= 2'd0;
-        else if (now) begin
-            sample <= sample == 2'd2 ? 2'd0 : sample + 1'b1;
-            seen   <= {seen[0], rx};
-        end
-
-        if (decide) begin
-            bit_number <= bit_number + 1'b1;
-            shifted    <= {level, shifted[8:1]};
-            if (last) {ninth, data} <= NINTH != 0 ? shifted : {1'b0, shifted[8:1]};
-        end
+        if (state == IDLE) eighth <= 7'd3;
+        else if (tick) eighth <= eighth + 7'd1;
+        rx_q <= rx;
+        if (tick) seen <= {seen[0], rx_q};
+        if (decide && !first && !last) shifted <= {level, shifted[7+NINTH:1]};
 
         case (state)
-            IDLE: begin
-                bit_number <= 4'd0;
-                if (!rx) state <= RECEIVE;
-            end
+            IDLE: if (!rx) state <= RECEIVE;
             RECEIVE:
                 if (decide && first && level) state <= IDLE;
                 else if (decide && last)      state <= level ? IDLE : RELEASE;
@@ -112,7 +106,7 @@ module uart_rx #(
         if (past && !$past(rst)) begin
             assert (state == IDLE || state == RECEIVE || state == RELEASE);
             assert (valid + framing_error + start_glitch <= 1);
-            if (state == RECEIVE) assert (bit_number <= STOP && sample <= 2'd2);
+            if (state == RECEIVE) assert (bit_number <= STOP);
             if (start_glitch) assert (!busy);
             cover (start_glitch);
         end

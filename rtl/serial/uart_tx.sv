@@ -2,14 +2,15 @@
 // uart_tx -- send the characters of a UART on a shared line: start bit, 8 data bits LSB first, a
 // 9th bit if there is one, stop bit.
 //
-// latency   1 cycle from valid to driver_enable when idle; the start bit follows one bit time
+// latency   1 cycle from valid to driver_enable when idle; the start bit follows 9/8 bit times
 //           later.
 // rate      characters without any gap
-// method    Bit n begins in the cycle at or before n * bit_time, so that rounding errors never add
-//           up.
+// method    Bit n begins 8 n ticks of bit_timer after the start bit, so that rounding errors never
+//           add up.
 // behaviour driver_enable leads the first start bit by at least one bit, and follows the last stop
-//           bit by at least half a bit.
-// limits    bit_time from 8 cycles up; less counts as 8.
+//           bit by at least half a bit: by one eighth of a bit more each, since a tick may come a
+//           cycle early.
+// limits    bit_time from 8 cycles up; 8 cycles are added to less.
 // source    S0: the 9th bit marks command bytes
 // model     tb/serial/uart_tx.py, equal in every bit of every cycle
 // proved    The line is high whenever it is not driven.
@@ -27,7 +28,8 @@ module uart_tx #(
     input  wire         ninth,          // level: the 9th bit; unused without one
     output logic        tx,             // level: the line, idles high
     output logic        driver_enable,  // level: the line driver is on
-    output logic        busy            // level: the line is driven
+    output logic        busy,           // level: the line is driven
+    output logic        tick            // strobe: an eighth of a bit; 8 per bit while busy
 );
     if (NINTH != 0 && NINTH != 1) begin : g_check
         NINTH_MUST_BE_0_OR_1 u_error ();
@@ -42,49 +44,43 @@ module uart_tx #(
         TRAIL
     } state_t;
 
-    state_t        state;
-    logic   [19:0] left;  // 1/16 cycle until the next bit
-    logic   [ 3:0] to_come;  // bits after this one
-    logic   [ 9:0] shifted;  // the bits to come, the next one lowest
+    state_t       state;
+    logic   [3:0] number;  // of the bit: 0 start, 1..8 data, 9 ninth, STOP; before them -2 and -1
+    logic   [2:0] eighth;  // of the bit
+    logic   [8:0] shifted;  // the bits to come, the next one lowest
 
-    wire    [19:0] whole = |bit_time[19:7] ? bit_time : 20'd128;
-    // Less than a cycle is left: the bit ends. A flip-flop, since it decides about the next
-    // character; a new bit is always longer than a cycle.
-    logic          now;
-
-    wire           begins = state == LEAD && now;
-    wire           goes_on = state == SEND && now && to_come == 4'd0;
+    wire          ends = tick && &eighth;
+    wire          begins = state == LEAD && ends && number[0];
+    wire          goes_on = state == SEND && ends && number == STOP;
+    wire          take = valid && ready;
 
     assign ready         = begins || goes_on || state == TRAIL;
     assign driver_enable = state != IDLE;
     assign busy          = state != IDLE;
 
-    always_ff @(posedge clk) begin
-        // rounded up, so that the lead is at least one bit
-        if (state == IDLE) left <= whole - 20'd1;
-        else if (!now) left <= left - 20'd16;
-        else if (state == SEND && ready)
-            left <= valid ? left - 20'd16 + whole : left + {1'b0, whole[19:1]};
-        else left <= left - 20'd16 + whole;
-        now <= state != IDLE && !now && left < 20'd32 && !(state == TRAIL && valid);
+    bit_timer u_timer (
+        .clk,
+        .bit_time,
+        .restart(state == IDLE || (state == TRAIL && valid)),
+        .tick
+    );
 
-        if (valid && ready) begin
+    always_ff @(posedge clk) begin
+        if (state == IDLE) {number, eighth} <= {4'd14, 3'd7};
+        else if (take) {number, eighth} <= 7'd0;
+        else if (tick) {number, eighth} <= {number, eighth} + 7'd1;
+
+        if (take) begin
             tx      <= 1'b0;
-            to_come <= STOP;
-            shifted <= {1'b1, NINTH != 0 ? ninth : 1'b1, data};
-            if (state == TRAIL) left <= whole - 20'd16;
-        end else if (state == SEND && now) begin
-            tx      <= to_come == 4'd0 || shifted[0];
-            to_come <= to_come - 1'b1;
-            shifted <= {1'b1, shifted[9:1]};
-        end
+            shifted <= {NINTH == 0 || ninth, data};
+        end else if (state == SEND && ends) {shifted, tx} <= {1'b1, shifted};
 
         case (state)
             IDLE:    if (valid)          state <= LEAD;
-            LEAD:    if (now)            state <= valid ? SEND : TRAIL;
+            LEAD:    if (ready)           state <= valid ? SEND : TRAIL;
             SEND:    if (ready && !valid) state <= TRAIL;
-            TRAIL:   if (valid)          state <= SEND;
-                     else if (now)       state <= IDLE;
+            TRAIL:   if (valid)           state <= SEND;
+                     else if (tick && eighth == 3'd4) state <= IDLE;
             default:                     state <= IDLE;
         endcase
         if (rst) begin
@@ -101,8 +97,12 @@ module uart_tx #(
         if (past && !$past(rst)) begin
             if (!driver_enable) assert (tx);
             if (state != SEND) assert (tx);
-            if (state == SEND) assert (to_come <= STOP);
-            if (state != IDLE) assert (now == (left < 20'd16));
+            if (state == LEAD) assert (number >= 4'd14);
+            if (state == SEND) assert (number <= STOP);
+            // behind the bits that are left there are ones
+            for (int n = 0; n < 9; n++)
+            if (state == SEND && n + int'(number) >= 8 + NINTH) assert (shifted[n]);
+            if (state == SEND && number == STOP) assert (tx);
             cover (state == SEND);
         end
     end

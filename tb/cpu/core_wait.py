@@ -8,7 +8,7 @@ class CoreWait:
 
     def step(self, start=0, cycles=0, wake=0, rst=0):
         if start:
-            self.left = cycles
+            self.left = cycles + 1
         elif self.left:
             self.left -= 1
         if wake or rst:

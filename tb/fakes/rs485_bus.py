@@ -55,8 +55,9 @@ class Rs485Port:
 
     def receive(self, word):
         """The words with which the node answers this one."""
-        passed, data, command = self.filter.step(self.node.address, 1, word & 0xFF, word >> 8)
-        passed, _, _, good, _, bad, sync = self.check.step(passed, data, command, 0)
+        data, command = word & 0xFF, word >> 8
+        own = self.filter.step(self.node.address, 1, data, command)
+        passed, good, bad, sync = self.check.word(own, data, command)
         self.count("FRAMES_BAD", bad)
         if not passed:
             return []
@@ -85,7 +86,7 @@ class Rs485Port:
         """The bus was low for longer than a character."""
         self.count("BREAKS")
         self.count("FRAMING_ERRORS")
-        self.count("FRAMES_BAD", self.check.step(0, 0, 0, 1)[5])
+        self.count("FRAMES_BAD", self.check.step(0, 0, 0, 1)[3])
 
     def millisecond(self):
         """A millisecond passes for the node, its firmware and the watchdog of the bus."""

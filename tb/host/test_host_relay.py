@@ -100,7 +100,8 @@ class FakeRelay(Transport):
         self.sent += 1
         self.booting -= self.booting > 0
         for word in self.spoil(list(words)):
-            valid, data, command, good, *_ = self.check.step(1, word & 0xFF, word >> 8, 0)
+            data, command = word & 0xFF, word >> 8
+            valid, good, _, _ = self.check.word(1, data, command)
             self.clk(valid=valid, data=data, command=command, good=good)
         answer = []
         for _ in range(2000):

@@ -99,7 +99,7 @@ async def a_drop_takes_back_all_that_waits(dut):
     queue = await begin(dut)
     await queue.put(CUT * 5)
     await queue.clk(drop=1)
-    seen = [await queue.clk(begins=1, reads=1) for _ in range(31)]
+    seen = [await queue.clk(begins=1, reads=1) for _ in range(62)]
     assert not any(valid for valid, _ in seen) and seen[-1][1] == 32 and queue.sent == []
 
 

@@ -7,38 +7,34 @@ the read of the cycle before, and `counts` are those in the memory.
 class EventCounters:
     def __init__(self, counters=16, width=32):
         self.counters, self.most = counters, (1 << width) - 1
-        self.counts, self.count = [0] * counters, 0
+        self.counts = [0] * counters
         self.reset()
 
     def reset(self):
-        self.waiting, self.raised, self.cleared = set(), None, 0
+        self.waiting, self.in_turn = set(), set()
+        self.place, self.raising, self.fresh = 0, False, True
+        self.cleared = None  # counter of the clear of the cycle before
 
     def step(self, events, read, clear, number, rst=0):
         """`events` is the set of the counters that have one."""
-        raised, self.raised = self.raised, None
-        new = None
-        if self.cleared < self.counters:
+        answer = self.counts[number]
+        access = read or clear or self.cleared is not None
+        if self.cleared is not None:
             self.counts[self.cleared] = 0
-            self.cleared += 1
-            starts = False
-        else:
-            starts = bool(self.waiting) and raised is None and not read and not clear
-            new = min(self.waiting) if starts else None
-        answer = self.counts[number if read else new] if read or starts else self.count
-        if clear:
-            self.counts[number] = 0
-        if raised is not None:
-            if read or clear:
-                self.waiting.add(raised)
-            else:
-                self.counts[raised] = min(self.count + 1, self.most)
-        if starts:
-            self.waiting.discard(new)
-            self.raised = new
-        if clear:
-            self.waiting.discard(number)
-        self.waiting |= events
-        self.count = answer
+        idle = self.place == 0 and not self.waiting and not self.fresh
+        if self.raising and not access and not idle:
+            here = self.place
+            if self.fresh:
+                self.counts[here] = 0
+            elif here in self.in_turn:
+                self.counts[here] = min(self.counts[here] + 1, self.most)
+            if here == 0:
+                self.in_turn, self.waiting = self.waiting, set()
+            self.place = (here + 1) % self.counters
+            self.fresh = self.fresh and self.place != 0
+        self.raising = not access and (idle or not self.raising)
+        self.cleared = number if clear else None
+        self.waiting = self.waiting | events
         if rst:
             self.reset()
-        return self.count
+        return answer

@@ -55,9 +55,9 @@ class Bus:
         """The memory takes its first values; the inputs are idle."""
         await RisingEdge(self.dut.ready)
         await FallingEdge(self.dut.clk)
-        if self.block.counted:  # so do the counts in a memory
-            for _ in range(self.block.counters):
-                self.model.step(0, 0, 0, 0, self.inputs)
+        # so do the counts in a memory
+        for _ in range(2 * self.block.counters + 1 if self.block.counted else 1):
+            self.model.step(0, 0, 0, 0, self.inputs)
 
     def pins(self, inputs):
         """The levels of the ports; the bits of a vector are one port."""
@@ -103,7 +103,6 @@ class Bus:
             for name, level in self.pins(self.inputs).items():
                 getattr(self.dut, name).value = level
             await self.ready()
-            self.model.step(0, 0, 0, 0, self.inputs)
         return got
 
     async def read(self, word, **inputs):
@@ -250,7 +249,7 @@ async def counters_count_clear_and_stop_at_the_end(dut):
     rtl_only("it sets counters inside, since they are too long to be counted to their end")
     bus = await Bus(dut).begin()
     for r, f in bus.of("counter"):
-        port, pause = f.port, 2 if f.in_memory else 0
+        port, pause = f.port, 4 * bus.block.counters if f.in_memory else 0
         await bus.count(port, 3, pause)
         assert await bus.read(r.word) == 3 << f.low
         await bus.write(r.word, WORD, **{port: 1})
@@ -266,6 +265,7 @@ async def counters_count_clear_and_stop_at_the_end(dut):
         await bus.count(port, 3, pause)
         assert await bus.read(r.word) == (1 << f.width) - 1 << f.low
         await bus.write(r.word, 0)
+        await bus.clk()
         assert await bus.read(r.word) == 0
 
 

@@ -98,8 +98,8 @@ class Requests:
 
     async def send(self, words, gaps=0, **levels):
         check = FrameCheck()
-        for word in words:
-            passed, data, command, good, *_ = check.step(1, *word, 0)
+        for data, command in words:
+            passed, good, _, _ = check.word(1, data, command)
             await self.clk(valid=passed, data=data, command=command, good=good, **levels)
             for _ in range(gaps):
                 await self.clk(data=random.getrandbits(8), **levels)
@@ -229,8 +229,8 @@ async def a_frame_that_begins_before_the_answer_is_out_is_dropped_whole(dut):
         while host.model.state != "receive":
             await host.clk(answer_ready=1)
         check = FrameCheck()
-        passed = [check.step(1, *word, 0) for word in words]
-        for _, data, command, good, *_ in passed[early:]:
+        passed = [(*word, check.word(1, *word)[1]) for word in words]
+        for data, command, good in passed[early:]:
             await host.clk(valid=1, data=data, command=command, good=good)
         for _ in range(20):
             await host.clk()

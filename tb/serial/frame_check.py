@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model of rtl/serial/frame_check.sv: step(...) advances one cycle and returns (valid, data,
-command, good, frame_good, frame_bad, sync) after it.
+"""Model of rtl/serial/frame_check.sv: step(...) advances one cycle and returns (valid, good,
+frame_good, frame_bad, sync) after it; good is None without valid.
 
 It keeps the bytes of the frame and asks zlib at its end.
 """
@@ -16,30 +16,48 @@ def frame(command, body):
     ]
 
 
+CYCLES = 9  # from a word to its result
+
+
 class FrameCheck:
     def __init__(self, longest=64):
-        self.longest, self.bytes = (
-            longest,
-            None,
-        )  # bytes of the running frame, the command byte first
+        self.longest = longest
+        self.bytes = None  # of the running frame, the command byte first
+        self.left, self.result = 0, None  # cycles until the result of a word: passed, ended, good
 
     def step(self, valid, data, command, framing_error, rst=0):
         if rst:
-            self.bytes = None
-            return 0, data, command, 0, 0, 0, 0
-        good = bad = passed = sync = 0
+            self.bytes, self.left = None, 0
+            return 0, None, 0, 0, 0
+        broken = passed = ended = good = sync = 0
+        out = 0, None, 0, 0, 0
+        if self.left:
+            self.left -= 1
+            if not self.left and self.result[0]:
+                _, ended, good, sync = self.result
+                out = 1, good, good, int(ended and not good), sync
+                ended = good = sync = 0
         if self.bytes is not None and framing_error:
-            self.bytes, bad = None, 1
+            self.bytes, broken = None, 1
         if valid and command:
-            bad |= self.bytes is not None
+            broken |= self.bytes is not None
             self.bytes, passed = bytes([data]) if data & 0x20 else None, 1
         elif valid and self.bytes is not None:
             self.bytes, passed = self.bytes + bytes([data]), 1
             length = self.bytes[1]
             if not 1 <= length <= self.longest:
-                self.bytes, bad = None, 1
+                self.bytes, broken = None, 1
             elif len(self.bytes) == length + 6:
+                ended = 1
                 good = int(zlib.crc32(self.bytes[:-4]) == int.from_bytes(self.bytes[-4:], "little"))
                 sync = int(good and not self.bytes[0] & 15)
-                self.bytes, bad = None, 1 - good
-        return passed, data, command, good, good, int(bad), sync
+                self.bytes = None
+        if valid:
+            self.left, self.result = CYCLES - 1, (passed, ended, good, sync)
+        return *out[:3], int(out[3] or broken), out[4]
+
+    def word(self, valid, data, command):
+        """A word and the cycles that it takes: (passed, good, bad, sync)."""
+        seen = [self.step(valid and not n, data, command, 0) for n in range(CYCLES)]
+        passed, good, _, _, sync = seen[-1]
+        return passed, int(passed and good), sum(bad for *_, bad, _ in seen), sync

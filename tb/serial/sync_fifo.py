@@ -16,11 +16,11 @@ class SyncFifo:
             self.present = 0
             return 0, None, self.depth, 0
         full = len(self.words) == self.depth
-        if pop and self.present:
+        drop = pop and self.present
+        # neither a word pushed in this cycle nor the one after a popped word is at the output yet
+        self.present = int(len(self.words) > 0 and not drop)
+        if drop:
             self.words.popleft()
-        self.present = int(
-            len(self.words) > 0
-        )  # a word pushed in this cycle is not at the output yet
         if push and not full:
             self.words.append(word)
         return (

@@ -37,7 +37,7 @@ class Loop:
         """Advance one cycle; with rx None the receiver listens to the transmitter. Return whether
         the byte was taken.
         """
-        d, taken = self.dut, data is not None and self.sender.ready()
+        d, taken = self.dut, data is not None and self.sender.ready(bit_time)
         rx = int(d.tx.value) if rx is None else rx
         d.bit_time.value, d.valid.value, d.data.value, d.rx.value = (
             bit_time,

@@ -32,7 +32,8 @@ module uart_loop (
         .ninth(1'b0),
         .tx,
         .driver_enable,
-        .busy ()
+        .busy (),
+        .tick ()
     );
     /* verilator lint_on PINCONNECTEMPTY */
     uart_rx #(

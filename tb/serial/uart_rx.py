@@ -7,46 +7,45 @@ start_glitch, busy) after it.
 
 from fractions import Fraction
 
+from tb.serial.bit_timer import BitTimer
+
 
 class UartRx:
     def __init__(self, ninth=1):
         self.last = 9 + ninth  # number of the stop bit
-        self.state, self.left, self.bits, self.samples = "release", 0, [], []
-        self.data = self.ninth = None
+        self.state, self.timer, self.ticks = "release", BitTimer(), 0
+        self.bits, self.samples = [], []
+        self.data = self.ninth = self.rx = None
 
     def step(self, rx, bit_time, rst=0):
-        whole = max(bit_time, 128)
-        spread = max(whole // 16, 16)
         valid = framing_error = start_glitch = 0
+        tick = self.timer.step(bit_time, self.state == "idle")
         if self.state == "idle":
-            self.left, self.bits, self.samples = whole // 2 - spread - 24, [], []
+            self.ticks, self.bits, self.samples = 0, [], []
             if not rx:
                 self.state = "receive"
         elif self.state == "release":
             if rx:
                 self.state = "idle"
-        elif self.left >= 16:
-            self.left -= 16
-        else:
-            self.samples.append(rx)
-            self.left += (spread if len(self.samples) < 3 else whole - 2 * spread) - 16
-            if (
-                len(self.samples) == 3
-                or len(self.bits) == self.last
-                and self.samples in ([0, 0], [1, 1])
-            ):
-                level, self.samples = int(sum(self.samples) >= 2), []
-                self.bits.append(level)
-                if len(self.bits) == 1 and level:
-                    start_glitch, self.state = 1, "idle"
-                elif len(self.bits) == self.last + 1:
-                    valid, framing_error, self.state = (
-                        level,
-                        1 - level,
-                        "idle" if level else "release",
-                    )
-                    self.data = sum(b << n for n, b in enumerate(self.bits[1:9]))
-                    self.ninth = self.bits[9] if self.last == 10 else 0
+        elif tick:
+            self.ticks += 1
+            if self.ticks % 8 in (3, 4, 5):
+                self.samples.append(self.rx)
+                if (
+                    len(self.samples) == 3
+                    or len(self.bits) == self.last
+                    and self.samples in ([0, 0], [1, 1])
+                ):
+                    level, self.samples = int(sum(self.samples) >= 2), []
+                    self.bits.append(level)
+                    if len(self.bits) == 1 and level:
+                        start_glitch, self.state = 1, "idle"
+                    elif len(self.bits) == self.last + 1:
+                        valid, framing_error = level, 1 - level
+                        self.state = "idle" if level else "release"
+                        self.data = sum(b << n for n, b in enumerate(self.bits[1:9]))
+                        self.ninth = self.bits[9] if self.last == 10 else 0
+        self.rx = rx
         if rst:
             valid = framing_error = start_glitch = 0
             self.state = "release"
