@@ -96,11 +96,11 @@ module index_latch #(
         logic judge, judge_q;  // index_count is ready to be judged, then turn
         logic [W-1:0] reference, turn;  // count at the preceding index; counts since then
 
-        wire on = each && counts_per_revolution != '0;
+        wire         on = each && counts_per_revolution != '0;
         // x + y is 0 if each of its bits takes the carry of the bit below, which is x | y there
         wire [W-1:0] carry = {turn[W-2:0] | counts_per_revolution[W-2:0], 1'b0};
-        wire up = turn == counts_per_revolution;
-        wire down = (turn ^ counts_per_revolution) == carry;
+        wire         up = turn == counts_per_revolution;
+        wire         down = (turn ^ counts_per_revolution) == carry;
 
         always_ff @(posedge clk) begin
             if (take) zeroed <= clears;
