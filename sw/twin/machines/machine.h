@@ -24,6 +24,7 @@ enum Drive : unsigned {  // pins that the node drives
     DAC_SCLK = 1 << 8,
     DAC_SDI = 1 << 9,
 };
+constexpr unsigned DRIVE_PINS = 10;
 
 enum Sense : unsigned {  // pins that the machine drives
     ENCODER_A = 1 << 0,
