@@ -23,9 +23,7 @@ def twin_realtime(simulated_s: float = 0.5) -> float:
     return realtime_factor(simulated_s)
 
 
-def cycle_times_ns(
-    axes: Sequence[int], cycles: int, rounds: int, started_s: float
-) -> list[float]:
+def cycle_times_ns(axes: Sequence[int], cycles: int, rounds: int, started_s: float) -> list[float]:
     """The time of one core for a cycle of a node with each of these numbers of axes, started_s
     after reset: the least of several rounds, in which the nodes take turns.
     """

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A machine as one axis of a node sees it: pins in, pins out, advanced cycle by cycle. An idle
-// machine costs one comparison a cycle: it is called when a pin that drives it changes, and at the
-// time that it requested.
+// machine costs nothing: it is called when a pin that drives it or another machine of its node
+// changes, at the time that it or another requested, and at the beginning of each run.
 #pragma once
 #include <cmath>
 #include <cstdint>
