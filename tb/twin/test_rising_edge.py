@@ -239,4 +239,4 @@ def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes
     output = build.run([program, tmp_path / "firmware", cycles, seed], "run of both")
     assert output.startswith(f"the same for {cycles} cycles")
     # how much it rests is a matter of the seed's requests
-    assert int(output.split()[-1]) > (cycles - axes * WAITS_FROM) / 2, "it rested too seldom"
+    assert int(output.split()[-1]) > (cycles - axes * WAITS_FROM) / 5, "it rested too seldom"
