@@ -3,7 +3,7 @@
 // bridge, a stepper driver or a DAC, with a fine stage that uses the DAC.
 //
 // latency  see bridge_pwm, step_generator, spi_dac and fine_stage
-// rate     one command per tick, a tick at least 53 cycles after the one before
+// rate     one command per tick, a tick at least 125 cycles after the one before
 // behaviour  The pins of a drive that is not built are idle.
 // source   S0: DC motor by PWM, piezo on top; S2: stepper; S3: current amplifier behind a DAC of 16
 //          bits

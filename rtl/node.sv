@@ -51,7 +51,8 @@ module node #(
     parameter FIRMWARE = "",  // file of its contents at power-up
     parameter int PROGRAM_BYTES = 32768,  // bytes that a serial core copies, a power of two
     parameter int FLASH_START = 131072,  // byte address of its firmware in the flash
-    parameter REGISTER_STYLE = "auto"  // ram_style of the memory of the settings
+    parameter REGISTER_STYLE = "auto",  // ram_style of the memory of the settings
+    parameter QUEUE_STYLE = "distributed"  // ram_style of the queues of the bus
 ) (
     input  wire               clk,
     input  wire               rst,
@@ -422,7 +423,8 @@ module node #(
     );
 
     rs485_port #(
-        .CLK_HZ(CLK_HZ)
+        .CLK_HZ     (CLK_HZ),
+        .QUEUE_STYLE(QUEUE_STYLE)
     ) u_rs485 (
         .clk,
         .rst,

@@ -9,7 +9,8 @@
 `default_nettype none
 
 module rs485_port #(
-    parameter int CLK_HZ = 4_000_000  // Hz, clk frequency
+    parameter int CLK_HZ      = 4_000_000,  // Hz, clk frequency
+    parameter     QUEUE_STYLE = "auto"      // ram_style of the queues
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -113,7 +114,8 @@ module rs485_port #(
     );
     sync_fifo #(
         .W    (10),
-        .DEPTH(128)
+        .DEPTH(128),
+        .STYLE(QUEUE_STYLE)
     ) u_received (
         .clk,
         .rst,
@@ -139,7 +141,8 @@ module rs485_port #(
     // transmit
     sync_fifo #(
         .W    (9),
-        .DEPTH(128)
+        .DEPTH(128),
+        .STYLE(QUEUE_STYLE)
     ) u_to_send (
         .clk,
         .rst,

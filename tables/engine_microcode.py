@@ -8,8 +8,9 @@ opposite); without terms the line passes acc on. The sum goes to acc, divided by
 undivided to a word. Effects and jobs are in the tables below.
 
 The engine works on three lines at once: it fetches one while it reads the operand of the line
-before and adds up the line before that. So what a line changes is known DISTANCE lines later. Where
-the program needs it sooner, the assembler inserts lines that only pass acc on.
+before and adds up the line before that. So what a line changes is known DISTANCE lines later, and
+one line sooner to a condition, which is tested one cycle after its line is fetched. Where the
+program needs it sooner, the assembler inserts lines that only pass acc on.
 """
 
 import re
@@ -26,16 +27,17 @@ MEMORY = RTL / "engine_memory.sv"
 PROOF = RTL / "engine_regions.sv"
 
 DISTANCE = 3  # lines from a change to the first line that can read it
-SIGN_DISTANCE = 2  # from a test to the first jump that depends on it
-SEEN_DISTANCE = 4  # from a change of the axis to what is seen of it
+TEST_DISTANCE = 2  # from a change to the first line whose condition depends on it
+SEEN_DISTANCE = 1  # more, from a change of the axis to what is seen of it
 LINES = 1024
 FINISH = 12  # cycles between two axes, the scan and the tick, at most
 
-# The words of an axis, by address. The first sixteen are two banks: `area`, `slope` and so on mean
-# the words of the feed override or, while `halting` is set, of a controlled stop.
-BANK = ("area", "slope", "increment", "value", "limit", "curve")
-RAMP = ("ramp_area", "ramp_slope", "ramp_increment", "distance", "override_slope", "override_curve")
-STOP = ("stop_area", "stop_slope", "stop_increment", "step", "stop_deceleration", "stop_jerk")
+# The words of an axis, by address. There are two banks: `area`, `slope` and so on mean the words of
+# the feed override or, while `halting` is set, of a controlled stop.
+BANK = ("area", "slope", "increment", "value")
+RAMP = ("ramp_area", "ramp_slope", "ramp_increment", "distance")
+STOP = ("stop_area", "stop_slope", "stop_increment", "step")
+RAMP_AT, STOP_AT = 0x00, 0x10
 STATE = (  # written by the engine; 0 after reset
     "context",
     "velocity",
@@ -62,28 +64,35 @@ STATE = (  # written by the engine; 0 after reset
     "command",
     "total",
 )
-SCRATCH = ("part", "base", "magnitude")
-SETTINGS = (  # written by the register bus
-    "override",
-    "kp",
-    "ki",
-    "kd",
-    "kv",
-    "ka",
-    "output_limit",
-    "integral_limit",
-    "dead_band",
-    "open_command",
-    "following_limit",
-    "step_ratio",
-    "trim_scale",
-    "quantum",
-    "start_at",
-    "segment_velocity",
-    "segment_acceleration",
-    "segment_jerk",
-    "segment_ticks",
-)
+SCRATCH = ("part", "base", "magnitude", "limit")
+# Written by the register bus. A word has the number of its register in its block with bit 4
+# inverted (tables/engine_words.py checks it), so the bus needs no table of them, and most are above
+# the words that the engine writes.
+SETTINGS = {
+    "trim_scale": 0x15,
+    "step_ratio": 0x17,
+    "following_limit": 0x18,
+    "integral_limit": 0x0C,
+    "kp": 0x30,
+    "ki": 0x31,
+    "kd": 0x32,
+    "kv": 0x33,
+    "ka": 0x34,
+    "output_limit": 0x35,
+    "dead_band": 0x36,
+    "quantum": 0x37,
+    "open_command": 0x39,
+    "segment_velocity": 0x3D,
+    "segment_acceleration": 0x3F,
+    "segment_jerk": 0x20,
+    "segment_ticks": 0x21,
+    "stop_deceleration": 0x22,
+    "stop_jerk": 0x23,
+    "override": 0x24,
+    "override_slope": 0x25,
+    "override_curve": 0x26,
+    "start_at": 0x27,
+}
 CONSTANTS = {
     "one": 1,
     "byte": 1 << 8,
@@ -117,12 +126,14 @@ def number_of(at: int) -> int:
 
 def addresses() -> dict[str, int]:
     """The address of every word in the memory of an axis; words of filters as of filter 0."""
-    found = {name: n for n, name in enumerate(RAMP)} | {name: 8 + n for n, name in enumerate(STOP)}
-    low = [6, 7, 14, 15, *range(16, 48)]  # what the engine writes is here
-    high = [*range(48, 64), *(4 * n + 3 for n in range(16, 32))]
+    found = {name: RAMP_AT + n for n, name in enumerate(RAMP)}
+    found |= {name: STOP_AT + n for n, name in enumerate(STOP)} | SETTINGS
+    taken = {*found.values()}
+    low = [at for at in range(48) if at not in taken]  # what the engine writes is here
+    high = [at for at in range(48, 64) if at not in taken] + [4 * n + 3 for n in range(16, 31)]
     written = [*STATE, *SCRATCH]
-    names, free = [*written, *SETTINGS, *CONSTANTS], [*low, *high]
-    if len(written) > len(low) or len(names) > len(free):
+    names, free = [*written, *CONSTANTS], [*low, *high]
+    if len(taken) < len(found) or len(written) > len(low) or len(names) > len(free):
         raise ValueError(f"{len(names)} words for {len(low)} and {len(high)} addresses")
     return found | dict(zip(names, free)) | {name: 128 + n for name, n in FILTER.items()}
 
@@ -136,6 +147,7 @@ OUTSIDE = ("0", "product", "product_high", "product_low", "halve") + (
     "now",
     "flags",
     "shift_by",
+    "setting",
 )
 OPERANDS = (  # how a line names what it adds
     {name: number_of(at) for name, at in ADDRESS.items() if at < 128}
@@ -145,9 +157,10 @@ OPERANDS = (  # how a line names what it adds
     | {name: 0x70 + n for n, name in enumerate(OUTSIDE)}
 )
 WORDS = (  # how a line names where its sum goes
-    {name: ADDRESS[name] for name in (*RAMP[:4], *STOP[:4], *STATE, *SCRATCH)}
-    | {name: 0x30 + n for n, name in enumerate(BANK[:4])}
+    {name: ADDRESS[name] for name in (*RAMP, *STOP, *STATE, *SCRATCH)}
+    | {name: 0x30 + n for n, name in enumerate(BANK)}
     | {f"tail_{name}": 0x34 + n for n, name in enumerate(SLOT)}
+    | {"setting": 0x37}  # the word of the setting that waits, if one does
     | {name: 0x38 + n for n, name in enumerate(FILTER_STATE)}
 )
 NOWHERE = 0x3F
@@ -160,13 +173,11 @@ EFFECTS = (
     "below",
     "above",
     "shift_8",
-    "shift_24",
     "x",
     "x_low",
     "x_high",
     "y",
     "y_low",
-    "y_high",
     "divide",
     "upward",
     "along",
@@ -220,8 +231,8 @@ PROGRAM = """
                                         ; unless wrapped boot
                                         ; booted
 
-# between two ticks: serve the requests of one axis after the other
-idle:                                   ; if due tick
+# between two ticks: write the setting that waits, serve the requests of one axis after the other
+idle:   setting -> setting              ; if due tick
                                         ; unless asked scan
                                         ; sample
                                         ; goto requests
@@ -231,7 +242,8 @@ scan:                                   ; next_axis
 # at the tick: serve one axis after the other
 tick:                                   ; set ticking
                                         ; first_axis
-axis:   context                         ; load_context
+axis:   setting -> setting
+        context                         ; load_context
                                         ; if shift_seen shift
                                         ; if start_now start
                                         ; goto measure
@@ -368,10 +380,9 @@ near:   acc - total
         acc - two31 -> measured         ; give velocity
 
 # a start at a time: this tick, if the time has come
-                                        ; unless armed make
+        one                             ; y, unless armed make
         now
         acc - start_at                  ; x_low
-        one                             ; y
         product
         acc - two31                     ; test
                                         ; unless negative make
@@ -381,22 +392,28 @@ near:   acc - total
                                         ; set moving
 # the target makes the step that was prepared
 make:                                   ; unless moving made
-                                        ; unless ready made
-        moved
+        moved                           ; unless ready made
         acc + step -> moved             ; if final end
-        acc >> 24
+        acc >> 8
+        acc >> 8
+        acc >> 8
         acc + anchor -> target          ; give target
-        step >> 24
+        step >> 8
+        acc >> 8
+        acc >> 8
         acc - top                       ; below
         acc + range                     ; above
         acc - two31 -> target_velocity  ; give target_velocity
-        change >> 24
+        change >> 8
+        acc >> 8
+        acc >> 8
         acc - top                       ; below
         acc + range                     ; above
-        acc - two31 -> target_acceleration
-                                        ; goto made
+        acc - two31 -> target_acceleration ; goto made
 # the last step rounds to the LSB, a half up
-end:    acc + half_step >> 24           ; stand
+end:    acc + half_step >> 8            ; stand
+        acc >> 8
+        acc >> 8
         acc + anchor -> target          ; give target
         acc -> anchor
         0 -> moved
@@ -493,20 +510,17 @@ lower:  part
         - output_limit                  ; set limited_down
 neither: acc -> sum
 
-sample: acc -> base
-                                        ; if closed section
+sample: acc -> base                     ; if closed section
         open_command                    ; x
         two16                           ; y
         product -> base
 section:                                ; unless filters filtered
         base -> part                    ; if lost track
         filtering                       ; test
-        known                           ; unless negative pass
-        - in_use                        ; test
-        known                           ; unless negative pass
         b0                              ; x
+        - in_use                        ; test, unless negative pass
         base                            ; y
-        b1                              ; x
+        b1                              ; x, unless negative pass
         x1                              ; y
         earlier_product
         acc + cut_off
@@ -522,7 +536,9 @@ section:                                ; unless filters filtered
         y2                              ; y
         one                             ; y
         total
-        acc + earlier_product >> 24 -> total
+        acc + earlier_product >> 8 -> total
+        acc >> 8
+        acc >> 8
         acc >> 8
         acc -> magnitude
         acc - top                       ; below
@@ -545,9 +561,9 @@ newer:  acc -> filtering
         - one -> known
         x1 -> x2
         base -> x1
+        part -> base
         y1 -> y2
-        part -> y1
-        part -> base                    ; next_filter
+        part -> y1                      ; next_filter
                                         ; goto section
 
 filtered: output_limit >> 8             ; unless closed open
@@ -593,7 +609,11 @@ untrimmed: acc -> part                  ; y_low
         acc
         earlier_product_low
         acc + product -> total
-        part                            ; y_high
+        part >> 8
+        acc >> 8
+        acc >> 8
+        acc >> 8
+        acc                             ; y
         step_ratio                      ; x_low
         total
         acc + earlier_product_high
@@ -602,27 +622,26 @@ untrimmed: acc -> part                  ; y_low
 
 # the profile: prepare the step of the next tick
         - offset -> base                ; unless moving prepared
-                                        ; if braking stop
-                                        ; unless ready begin
+        override_slope -> limit         ; if braking stop
+        override_curve -> magnitude     ; unless ready begin
         - override_slope                ; test
         - ramp_slope                    ; unless negative at_once
         acc                             ; test
         rate                            ; if negative toward
-# the smaller of limit and curve, unless curve is 0
+# the smaller of limit and curve, which is in magnitude, unless the curve is 0
 choose: limit -> increment
-        acc - curve                     ; test
-        - curve                         ; if negative chosen
+        acc - magnitude                 ; test
+        - magnitude                     ; if negative chosen
         acc                             ; test
-        curve                           ; unless negative chosen
+        magnitude                       ; unless negative chosen
         acc -> increment
 chosen: rate                            ; if halting divide
 toward: acc - override -> distance      ; goto law
 
 # a controlled stop: slope becomes the acceleration in whole increments
-stop:                                   ; set halting
-                                        ; if stopping law
-                                        ; set stopping
-        - limit                         ; test
+stop:   - stop_deceleration             ; test, set halting
+        stop_deceleration -> limit      ; if stopping law
+        stop_jerk -> magnitude          ; set stopping
                                         ; set first
                                         ; unless negative at_end
                                         ; goto choose
@@ -795,7 +814,7 @@ prepared: flags -> context              ; give state
 
 @dataclass
 class Line:
-    """A line of the program, and what of the engine it changes and reads."""
+    """A line of the program, and what of the engine it changes, reads and tests."""
 
     text: str
     label: str = ""
@@ -810,6 +829,7 @@ class Line:
     action: str = ""
     changes: set[str] = field(default_factory=set)
     reads: set[str] = field(default_factory=set)
+    tests: set[str] = field(default_factory=set)
 
     def loads(self) -> bool:
         return self.effect[0] in "xy" or self.effect == "divide"
@@ -818,7 +838,7 @@ class Line:
 def parsed(text: str) -> Line:
     """The line of this text. A ValueError says what is wrong with it."""
     found = re.fullmatch(
-        r"(?:(\w+):)?\s*(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?(?: >> (8|24))?"
+        r"(?:(\w+):)?\s*(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?(?: >> (8))?"
         r"(?: -> (\w+))?(?: ?; (.*))?",
         text,
     )
@@ -852,13 +872,10 @@ def parsed(text: str) -> Line:
 
 
 QUEUE = {"empty", "full"}
-BANKED = {
-    name: {BANK[n] for n in range(len(BANK))} for name in (*RAMP, *STOP)
-}  # a word of a bank is also meant by its shared name
 
 
 def dependences(line: Line) -> None:
-    """Fill in what a line changes at its end and what it reads when it is fetched."""
+    """Fill in what a line changes at its end, reads when it is fetched, and tests."""
     word, operand = line.word, line.operand
     if word:
         line.changes.add(word)
@@ -881,13 +898,13 @@ def dependences(line: Line) -> None:
     if operand in ("position", "elapsed"):
         line.reads.add("seen")
     condition = line.condition
-    line.reads.add("queue" if condition in QUEUE else condition)
+    line.tests.add("queue" if condition in QUEUE else condition)
     if condition.endswith("_seen") or CONDITIONS[condition] >= CONDITIONS["stepped"]:
-        line.reads.add("seen")
+        line.tests.add("seen")
     if condition == "asked":
-        line.reads.add("seen")
+        line.tests.add("seen")
     if condition == "wrapped":
-        line.reads.add("axis")
+        line.tests.add("axis")
     action = line.action
     if line.effect in ("test", "upward"):
         line.changes.add("negative" if line.effect == "test" else "upward")
@@ -913,7 +930,7 @@ def dependences(line: Line) -> None:
 
 def source() -> list[Line]:
     """The lines of the program as written, after those that clear the words of an axis."""
-    cleared = [*RAMP[:4], *STOP[:4], *STATE]
+    cleared = [*RAMP, *STOP, *STATE]
     texts = [f"{'boot: ' if not n else ''}0 -> {name}" for n, name in enumerate(cleared)]
     for text in PROGRAM.splitlines():
         text = " ".join(text.split("#")[0].split())
@@ -937,6 +954,18 @@ def successors(lines: list[Line]) -> list[list[int]]:
     return found
 
 
+def distance_of(line: Line, later: Line) -> int:
+    """How many lines after a line a later one may come at the earliest, if that depends on it."""
+    read, tested = line.changes & later.reads, line.changes & later.tests
+    needed = [DISTANCE + SEEN_DISTANCE * ("seen" in read)] * bool(read)
+    needed += [TEST_DISTANCE + SEEN_DISTANCE * ("seen" in tested)] * bool(tested)
+    if "product" in later.operand and "earlier_" not in later.text and line.loads():
+        needed.append(DISTANCE)
+    if later.effect == "along" and "upward" in line.changes:
+        needed.append(2)
+    return max(needed, default=0)
+
+
 def missing(lines: list[Line]) -> tuple[int, int] | None:
     """(number of a line, lines that are missing before it), of the first that comes too soon."""
     before: list[list[int]] = [[] for _ in lines]
@@ -946,24 +975,11 @@ def missing(lines: list[Line]) -> tuple[int, int] | None:
                 before[m].append(n)
     for n, line in enumerate(lines):
         reached = {n}
-        for distance in range(1, SEEN_DISTANCE):
+        for distance in range(1, DISTANCE + SEEN_DISTANCE):
             reached = {b for r in reached for b in before[r]}
-            for b in reached:
-                change = lines[b].changes & line.reads
-                if distance >= SIGN_DISTANCE:
-                    change -= {"negative"}
-                if change == {"negative"}:
-                    return n, SIGN_DISTANCE - distance
-                if "seen" in change:
-                    return n, SEEN_DISTANCE - distance
-                if distance >= DISTANCE:
-                    continue
-                if "product" in line.operand and "earlier_" not in line.text and lines[b].loads():
-                    change = {"product"}
-                if line.effect == "along" and "upward" in lines[b].changes and distance == 1:
-                    return n, 1
-                if change:
-                    return n, DISTANCE - distance
+            needed = max((distance_of(lines[b], line) for b in reached), default=0)
+            if needed > distance:
+                return n, needed - distance
     return None
 
 

@@ -2,7 +2,8 @@
 """Make rtl/control/engine_words.sv: which registers are words of motion_engine.
 
 The property `engine` of a register in tables/registers.rdl is the name of its word, one of the
-settings in tables/engine_microcode.py, with the bits by which its value is shifted left.
+settings in tables/engine_microcode.py, with the bits by which its value is shifted left. A word of
+the engine has the number of its register with bit 4 inverted.
 """
 
 import sys
@@ -32,9 +33,9 @@ class Word:
     signed: bool
 
     @property
-    def number(self) -> int:
-        """How the engine counts the word, 0 for the values of a filter."""
-        return engine_microcode.OPERANDS.get(self.name, 0)
+    def places(self) -> int:
+        """Bits, in pairs, by which the value is shifted right from the top of 64 bits."""
+        return 0 if self.wide else 16 - self.shift // 2
 
     @property
     def entry(self) -> str:
@@ -53,20 +54,19 @@ def words() -> list[Word]:
             if block.base != BASE + kind * BLOCKS_OF_KIND * registers.SLOT:
                 raise ValueError(f"registers.rdl: the block {block.name} is not where it should be")
             name, _, shift = r.engine.partition(" << ")
-            known = (*engine_microcode.SETTINGS, *engine_microcode.RAMP, *engine_microcode.STOP)
-            if name not in (*known, FILTER_ADDRESS, FILTER_VALUE):
+            number = engine_microcode.SETTINGS.get(name)
+            if number is None and name not in (FILTER_ADDRESS, FILTER_VALUE):
                 raise ValueError(f"registers.rdl: {r.name}: the engine has no word {name}")
+            if number not in (None, r.word + r.wide ^ 0x10):
+                raise ValueError(f"registers.rdl: {r.name}: the word {name} has another number")
             if r.fields[0].low or (len(r.fields) > 1 and r.fields[0].signed):
                 raise ValueError(f"registers.rdl: {r.name}: its value is not the whole word")
             signed = r.fields[0].signed
             found.append(Word(kind, r.word + r.wide, name, int(shift or 0), r.wide, signed))
-    missing = {*engine_microcode.SETTINGS} - {w.name for w in found} - {"shift_by"}
+    missing = {*engine_microcode.SETTINGS} - {w.name for w in found}
     if missing:
         raise ValueError(f"registers.rdl: no register is the word {sorted(missing)[0]}")
     return found
-
-
-SHIFTS = (0, 2, 8, 16, 24)  # by which values are shifted left, by their number
 
 
 def case(found: Sequence[Word], output: str) -> list[str]:
@@ -79,21 +79,15 @@ def case(found: Sequence[Word], output: str) -> list[str]:
 
 def text() -> str:
     found = words()
-    numbers = [
-        f"            {w.entry}: number = {registers.literal(7, w.number)};  // {w.name}"
-        for w in found
-        if w.number
-    ]
     shifted = [
-        f"            {', '.join(w.entry for w in found if w.shift == shift)}: "
-        f"scale = 3'd{n};  // {shift} bits"
-        for n, shift in enumerate(SHIFTS)
-        if n
+        f"            {', '.join(w.entry for w in found if w.places == places)}: "
+        f"places = 5'd{places};"
+        for places in sorted({w.places for w in found} - {16})
     ]
     flags = {
         "of_engine": [w for w in found if w.name != FILTER_ADDRESS],
         "wide": [w for w in found if w.wide],
-        "has_sign": [w for w in found if w.signed],
+        "has_sign": [w for w in found if w.signed and not w.wide],
         "gain": [w for w in found if w.name in GAINS],
         "push": [w for w in found if w.name == PUSH],
         "filter_address": [w for w in found if w.name == FILTER_ADDRESS],
@@ -102,11 +96,11 @@ def text() -> str:
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
-// engine_words -- translate a word of the register map into the word of motion_engine that it sets.
+// engine_words -- report what motion_engine does with a word of the register map.
 //
 // latency   0 cycles, combinational
 // rate      one word per cycle
-// source    tables/registers.rdl; tables/engine_microcode.py
+// source    tables/registers.rdl
 // model     tb/control/engine_words.py, equal for every word
 // made      by tables/engine_words.py, not to be edited
 `default_nettype none
@@ -114,11 +108,10 @@ def text() -> str:
 module engine_words (
     input wire [1:0] kind,  // number of the kind of block: 0 axis, 1 feedback channel, 2 actuator
     input wire [5:0] word,  // word of the block
-    output logic [6:0] number,  // number of the engine's word
-    output logic [2:0] scale,  // number of the shift to the left: 0, 2, 8, 16, 24 bits
+    output logic [4:0] places,  // pairs of bits: shift to the right from the top of 64 bits
     output logic of_engine,  // level: the engine has this word
     output logic wide,  // level: it is the high word of a value of 64 bits
-    output logic has_sign,  // level: its value is signed
+    output logic has_sign,  // level: its value has 32 bits or less and is signed
     output logic gain,  // level: it is a gain of the servo
     output logic push,  // level: a write of it queues the segment
     output logic filter_address,  // level: it is the number of a value of a filter
@@ -128,12 +121,8 @@ module engine_words (
 
     always_comb begin
         case (entry)""",
-            *numbers,
-            """            default: number = '0;
-        endcase
-        case (entry)""",
             *shifted,
-            """            default: scale = '0;
+            """            default: places = 5'd16;
         endcase""",
             f"        {{{', '.join(flags)}}} = '0;",
             *(line for output, some in flags.items() for line in case(some, output)),

@@ -19,17 +19,19 @@ module tick_divider #(
     input  wire          restart,  // strobe: a new period begins; suppresses a tick that is due now
     output logic         tick      // strobe: a period has ended
 );
-    logic [W-1:0] elapsed;  // cycles since the last tick
+    localparam bit [W-1:0] ONE = 1;
+
+    logic [W-1:0] elapsed;  // cycles since the last tick, with this one
 
     wire          on = |period;
-    wire          due = elapsed >= period - 1'b1;
+    wire          due = elapsed >= period;
 
     always_ff @(posedge clk) begin
         tick    <= on && due && !restart;
-        elapsed <= on && !due && !restart ? elapsed + 1'b1 : '0;
+        elapsed <= due || restart ? ONE : elapsed + 1'b1;
         if (rst) begin
             tick    <= 1'b0;
-            elapsed <= '0;
+            elapsed <= ONE;
         end
     end
 
@@ -50,7 +52,8 @@ module tick_divider #(
         if (rst) since <= '0;
         if (past && !$past(rst)) begin
             assert (!(tick && $past(period) == 0));
-            if (!tick) assert (elapsed <= since);
+            assert (elapsed != '0);
+            if (!tick) assert (elapsed - 1'b1 <= since);
             if (tick) assert (since >= shortest || shortest == 0);
             cover (tick && $past(tick));
             cover (tick && shortest == 5);

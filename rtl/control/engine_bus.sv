@@ -2,19 +2,22 @@
 // engine_bus -- pass what is written to the register map to motion_engine, and let the soft core
 // wait while a setting or a request is not done yet.
 //
-// latency   1 cycle from stores to setting_write and gains_changed; push when its setting is
-//           written
+// latency   1 cycle from stores to setting_write and gains_changed for a value of 64 bits, 17 at
+//           most for a shorter one; push when its setting is written
 // rate      one word, then the next one when hold and waits are low
+// method    A value enters at the top of the setting, and is shifted right, two bits per cycle, to
+//           the unit of the engine. The engine's word has the number of its register in its block,
+//           with bit 4 inverted.
 // behaviour A word that is not of the engine, or of an axis or a filter that is not built, is left
 //           out. gains_changed comes before the gain is written, so that no tick uses a gain
 //           without it. waits is high while anything that was requested of the engine is not done
 //           and shown: the registers always show the state after all requests, in their order. Only
 //           one shift of an origin at a time waits, so there is one shift_by for all axes.
-// source    engine_words: which register is which word
+// source    engine_words: which registers are words of the engine
 // model     tb/control/engine_bus.py, equal in every bit of every cycle
 // proved    A word of the engine gives one setting, with hold high until it is written, and a
 //           segment one push after that.
-// proof     depth 8, AXES = 2, FILTERS = 1
+// proof     depth 23, AXES = 2, FILTERS = 1
 `default_nettype none
 
 module engine_bus #(
@@ -47,21 +50,24 @@ module engine_bus #(
     input  wire         [48*AXES-1:0] moved_by,        // 2^-16 period, of each axis
     output logic signed [       47:0] shift_by         // 2^-16 period, of the last jump
 );
-    // of the map: 24 blocks of axes from 0x400 on, eight of each kind
-    wire [7:0] block = address[13:6] - 8'd4;
-    wire [2:0] axis = block[2:0];
-    wire       of_axis = block < 8'd24 && {1'b0, axis} < 4'(AXES);
-    wire [6:0] number;
-    wire [2:0] scale;
+    // of the map: 24 blocks of axes from 0x400 on, eight of each kind; the fourth to the 27th block
+    wire [1:0] kind = address[10:9] - 2'(!address[8]);
+    wire [2:0] axis = {!address[8], address[7:6]};
+    wire       in_map = address[13:11] == '0 && address[10:8] != 3'd0 && address[10:8] != 3'd7;
+    wire       of_axis = in_map && {1'b0, axis} < 4'(AXES);
+    wire [4:0] places;
     wire of_engine, wide, has_sign, gain, segment, filter_address, filter_value;
     logic [4:0] filter_at;  // value of a filter that filter_value writes
-    logic       pushes;  // the setting ends a segment
+    logic       scales;  // the setting is being shifted
+    logic [4:0] left;  // pairs of bits by which it is still to be shifted
+    logic       fill;  // its sign
+    logic       of_gain;  // it is a gain
+    logic       pushes;  // it ends a segment
 
     engine_words u_words (
-        .kind(block[4:3]),
+        .kind,
         .word(address[5:0]),
-        .number,
-        .scale,
+        .places,
         .of_engine,
         .wide,
         .has_sign,
@@ -71,52 +77,54 @@ module engine_bus #(
         .filter_value
     );
 
-    wire there = filter_value ? FILTERS != 0 && filter_at[4:3] <= 2'(FILTERS - 1) : of_engine;
-    wire take = stores && of_axis && there;
-    wire [31:0] low = wide ? value_low : value;
-    wire [31:0] high = wide ? value : {32{has_sign && value[31]}};
-    // 65536 is the largest fraction of the feed override
-    wire [15:0] fraction = value[16] ? '0 : value[15:0];
+    wire        built = {1'b0, filter_at[4:3]} + 3'd1 <= 3'(FILTERS);
+    wire        there = filter_value ? built : of_engine;
+    wire        take = stores && of_axis && there;
+    // 65536 is the largest fraction of the feed override; nothing else has bit 16 and these places
+    wire        largest = places == 5'd8 && value[16];
+    wire [15:0] fraction = largest ? '0 : value[15:0];
 
-    wire written = !setting_write && !setting_waits;
+    wire        scaled = scales && left == 5'd1;
+    wire        written = !scales && !setting_write && !setting_waits;
 
-    assign hold  = setting_write || setting_waits || pushes || !ready;
+    assign hold  = scales || setting_write || setting_waits || pushes || !ready;
     assign waits = hold || |{push, pending, moves, moved};
 
     always_ff @(posedge clk) begin
-        setting_write <= take;
+        scales        <= take ? !wide : scales && !scaled;
+        setting_write <= take ? wide : scaled;
         gains_changed <= '0;
         push          <= '0;
         if (written) pushes <= 1'b0;
         if (stores && of_axis && filter_address) filter_at <= value[4:0];
-        if (take) begin
+        if (scales) begin
+            left    <= left - 1'b1;
+            setting <= {{2{fill}}, setting[63:2]};
+        end else if (take) begin
             pushes         <= segment;
+            of_gain        <= gain;
             setting_axis   <= axis;
-            setting_word   <= filter_value ? 7'h50 + {4'd0, filter_at[2:0]} : number;
+            setting_word   <= filter_value ? {4'hA, filter_at[2:0]} : {1'b0, address[5:0] ^ 6'h10};
             setting_filter <= filter_at[4:3];
-            case (scale)
-                3'd1:    setting <= {high[29:0], low, 2'd0};
-                3'd2:    setting <= {high[23:0], low, 8'd0};
-                3'd3:    setting <= {31'd0, value[16], fraction, 16'd0};
-                3'd4:    setting <= {8'd0, low, 24'd0};
-                default: setting <= {high, low};
-            endcase
+            left           <= places;
+            fill           <= has_sign && value[31];
+            setting        <= {value[31:16], fraction, wide ? value_low : 32'd0};
         end
         for (int n = 0; n < AXES; n++) begin
-            if (take && gain && axis == 3'(n)) gains_changed[n] <= 1'b1;
+            if (scaled && of_gain && setting_axis == 3'(n)) gains_changed[n] <= 1'b1;
             if (written && pushes && setting_axis == 3'(n)) push[n] <= 1'b1;
             if (moved[n]) shift_by <= moved_by[48*n+:48];
         end
         if (rst) begin
-            {setting_write, pushes, gains_changed, push} <= '0;
+            {scales, setting_write, pushes, gains_changed, push} <= '0;
             filter_at <= '0;
         end
     end
 
 `ifdef FORMAL
-    logic       past = 1'b0;
-    logic       owed = 1'b0;  // a segment was given and is not pushed
-    logic [2:0] owed_axis;
+    logic past = 1'b0;
+    logic owed = 1'b0;  // a segment was given and is not pushed
+    logic [2:0] owed_axis, given_axis;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -127,9 +135,12 @@ module engine_bus #(
             else if (past && !$past(setting_waits)) assume (!setting_waits);
         owed <= !rst && ((take && segment) || (owed && push == '0));
         if (take && segment) owed_axis <= axis;
+        if (take) given_axis <= axis;
         if (past) begin
-            assert (setting_write == ($past(take) && !$past(rst)));
-            if (setting_write) assert (hold && waits && setting_axis == $past(axis));
+            assert (scales == ($past(take ? !wide : scales && left != 5'd1) && !$past(rst)));
+            assert (setting_write == ($past(take ? wide : scales && left == 5'd1) && !$past(rst)));
+            if (scales) assert (left >= 5'd1 && left <= 5'd16 && !setting_write && !setting_waits);
+            if (scales || setting_write) assert (hold && waits && setting_axis == given_axis);
             if (pushes) assert (setting_axis == owed_axis && !push[owed_axis[$clog2(AXES)-1:0]]);
             if (owed || pushes) assert ({1'b0, owed_axis} < 4'(AXES));
             if (owed)

@@ -20,7 +20,7 @@ module engine_inputs (
     input  wire                rst,
     input  wire                tick,           // strobe: take everything
     input  wire                sample,         // strobe: take position and requests
-    input  wire         [23:0] elapsed,        // cycles since the last tick, 0 in its cycle
+    input  wire         [23:0] elapsed,        // cycles since the last tick, before this one
     // the axis
     input  wire signed  [47:0] position,       // 2^-16 period
     input  wire                stepped,        // strobe: position has made a step
@@ -58,7 +58,7 @@ module engine_inputs (
         step_live     <= stepped || (step_live && !tick);
         lost_live     <= !tick && (lost_live || powerless);
         lost_off_live <= !tick && (lost_off_live || off);
-        if (stepped) {step_down, step_elapsed} <= {downward, elapsed};
+        if (stepped) {step_down, step_elapsed} <= {downward, tick ? 24'd0 : elapsed};
         if (tick || sample) seen_position <= position;
         if (tick) begin
             seen_elapsed <= step_elapsed;

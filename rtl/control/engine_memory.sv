@@ -28,23 +28,23 @@ module engine_memory #(
     initial begin
         for (int n = 0; n < AXES * WORDS; n++) words[n] = '0;
         for (int n = 0; n < AXES; n++) begin
-            words[n*WORDS+58] = 72'h1;  // one
-            words[n*WORDS+59] = 72'h100;  // byte
-            words[n*WORDS+60] = 72'h80;  // half_byte
-            words[n*WORDS+61] = 72'h10000;  // two16
+            words[n*WORDS+56] = 72'h1;  // one
+            words[n*WORDS+58] = 72'h100;  // byte
+            words[n*WORDS+59] = 72'h80;  // half_byte
+            words[n*WORDS+60] = 72'h10000;  // two16
             words[n*WORDS+62] = 72'h100000;  // two20
-            words[n*WORDS+63] = 72'h800000;  // half_step
-            words[n*WORDS+67] = 72'h1000000;  // two24
-            words[n*WORDS+71] = 72'hffffff;  // longest
-            words[n*WORDS+75] = 72'h7fffffff;  // top
-            words[n*WORDS+79] = 72'h80000000;  // two31
-            words[n*WORDS+83] = 72'hffffffff;  // range
-            words[n*WORDS+87] = 72'h100000000;  // full
-            words[n*WORDS+91] = 72'h200000000;  // two33
-            words[n*WORDS+95] = 72'h1ffffffff;  // top34
-            words[n*WORDS+99] = 72'h3ffffffff;  // range34
-            words[n*WORDS+103] = 72'h1000000000;  // two36
-            words[n*WORDS+107] = 72'h40000000000000000;  // two66
+            words[n*WORDS+67] = 72'h800000;  // half_step
+            words[n*WORDS+71] = 72'h1000000;  // two24
+            words[n*WORDS+75] = 72'hffffff;  // longest
+            words[n*WORDS+79] = 72'h7fffffff;  // top
+            words[n*WORDS+83] = 72'h80000000;  // two31
+            words[n*WORDS+87] = 72'hffffffff;  // range
+            words[n*WORDS+91] = 72'h100000000;  // full
+            words[n*WORDS+95] = 72'h200000000;  // two33
+            words[n*WORDS+99] = 72'h1ffffffff;  // top34
+            words[n*WORDS+103] = 72'h3ffffffff;  // range34
+            words[n*WORDS+107] = 72'h1000000000;  // two36
+            words[n*WORDS+111] = 72'h40000000000000000;  // two66
         end
     end
 

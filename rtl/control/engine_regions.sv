@@ -14,12 +14,12 @@ module engine_regions (
 );
     always_comb begin
         region = 3'd0;
-        if (line >= 10'd46 && line <= 10'd46) region = 3'd4;  // enter
-        if (line >= 10'd47 && line <= 10'd52) region = 3'd2;  // serve
-        if (line >= 10'd56 && line <= 10'd66) region = 3'd1;  // shared
-        if (line >= 10'd94 && line <= 10'd100) region = 3'd1;  // shared
-        if (line >= 10'd117 && line <= 10'd636) region = 3'd2;  // serve
-        if (line >= 10'd637 && line <= 10'd640) region = 3'd3;  // leave
+        if (line >= 10'd44 && line <= 10'd44) region = 3'd4;  // enter
+        if (line >= 10'd45 && line <= 10'd50) region = 3'd2;  // serve
+        if (line >= 10'd53 && line <= 10'd62) region = 3'd1;  // shared
+        if (line >= 10'd89 && line <= 10'd94) region = 3'd1;  // shared
+        if (line >= 10'd109 && line <= 10'd632) region = 3'd2;  // serve
+        if (line >= 10'd633 && line <= 10'd635) region = 3'd3;  // leave
     end
 endmodule
 

@@ -2,10 +2,12 @@
 // engine_sequencer -- fetch the lines of the microcode of motion_engine, decide the jumps, and
 // serve one axis after the other at each tick.
 //
-// latency   1 cycle from tick to busy; a jump costs no cycle. A condition is tested when its line
-//           is fetched, the actions of a line are executed two cycles later.
+// latency   1 cycle from tick to busy; a jump costs no cycle. The condition of a line is tested one
+//           cycle after the line is fetched, its action is executed two cycles after.
 // rate      one line per cycle; a tick when the one before has been served. overrun reports a tick
 //           that comes sooner.
+// method    The line that follows and the line that a jump leads to are both read. The condition is
+//           tested while they arrive, so the test begins at flip-flops and not at the block RAM.
 // model     tb/control/engine_sequencer.py, equal in every bit of every cycle
 // proved    Whatever the conditions are: a tick ends only after every axis was served, once and in
 //           order; an axis is served for a tick only while the tick is busy, and every tick that
@@ -29,50 +31,36 @@ module engine_sequencer #(
     output logic        overrun,     // strobe: a tick came before the last one was served
     output logic [15:0] cycles       // cycles that a tick needs at most
 );
-    localparam [5:0] NEVER = 6'd0, TICKING = 6'd16, NEGATIVE = 6'd24, LOOP = 6'd25, DUE = 6'd26;
-    localparam [5:0] WRAPPED = 6'd28;
+    localparam [5:0] NEVER = 6'd0, TICKING = 6'd16, LOOP = 6'd25, DUE = 6'd26, WRAPPED = 6'd28;
     localparam [7:0] FIRST_AXIS = 8'h21, NEXT_AXIS = 8'h22, FINISHED = 8'h25;
     localparam [7:0] SET_TICKING = 8'h50;
     localparam [2:0] COUNT = 3'd5;
 
     wire [35:0] next_code, target_code;
     logic [9:0] next_line, target_line;
-    logic       jumped;  // the line before jumped
-    logic       ticking;  // the axes are served because of a tick
-    logic [4:0] count;  // how often a line is still repeated
-    logic [7:0] read_action;  // action of the line whose operand is there
-
-    assign code = jumped ? target_code : next_code;
-
-    wire  [ 9:0] line = jumped ? target_line : next_line;
-    wire  [ 9:0] next = rst ? '0 : line + 1'b1;
-    wire         unless = code[25];
-    wire  [ 5:0] condition = code[24:19];
+    logic        unless;  // the line before jumps unless its condition holds
+    logic [ 5:0] condition;  // of the line before
+    logic        ticking;  // the axes are served because of a tick
+    logic [ 4:0] count;  // how often a line is still repeated
+    logic [ 7:0] read_action;  // action or target of the line whose operand is there
     logic [63:0] all;
-
-    // The conditions of both lines that may be fetched are tested at once. The adder knows latest
-    // whether its sum is negative, so that comes last.
-    wire  [ 5:0] next_condition = next_code[24:19];
-    wire  [ 5:0] target_condition = target_code[24:19];
-    wire         next_jump = next_code[25] ? !all[next_condition] : all[next_condition];
-    wire         target_jump = target_code[25] ? !all[target_condition] : all[target_condition];
-    wire         next_tests_sign = next_condition == NEGATIVE;
-    wire         target_tests_sign = target_condition == NEGATIVE;
-    wire         tests_sign = jumped ? target_tests_sign : next_tests_sign;
-    wire         jump = (jumped ? target_jump : next_jump) ^ (tests_sign && conditions[NEGATIVE]);
 
     always_comb begin
         all = conditions;
         all[NEVER] = 1'b0;
-        all[NEGATIVE] = 1'b0;
         all[TICKING] = ticking;
         all[LOOP] = count != 5'd1;
         all[DUE] = busy;
         all[WRAPPED] = axis == 3'd0;
     end
 
-    wire acts = condition == '0 && !unless;
-    wire finishes = action == FINISHED;
+    wire       jump = all[condition] ^ unless;
+    wire [9:0] line = jump ? target_line : next_line;
+    wire [9:0] next = rst ? '0 : line + 1'b1;
+    wire       acts = condition == NEVER && !unless;
+    wire       finishes = action == FINISHED;
+
+    assign code = jump ? target_code : next_code;
 
     engine_microcode #(
         .AXES       (AXES),
@@ -90,9 +78,10 @@ module engine_sequencer #(
     always_ff @(posedge clk) begin
         next_line   <= next;
         target_line <= code[35:26];
-        jumped      <= jump;
-        read_action <= acts ? code[33:26] : '0;
-        action      <= read_action;
+        unless      <= code[25];
+        condition   <= code[24:19];
+        read_action <= code[33:26];
+        action      <= acts ? read_action : '0;
         if (condition == LOOP) count <= count - 1'b1;
         if (action[7:5] == COUNT) count <= action[4:0];
         if (action == FIRST_AXIS) axis <= '0;
@@ -100,7 +89,7 @@ module engine_sequencer #(
         ticking <= action == SET_TICKING || (ticking && !finishes);
         busy    <= tick || (busy && !finishes);
         overrun <= tick && busy && !finishes;
-        if (rst) {jumped, read_action, action, axis, ticking, busy, overrun} <= '0;
+        if (rst) {unless, condition, read_action, action, axis, ticking, busy, overrun} <= '0;
     end
 
 `ifdef FORMAL

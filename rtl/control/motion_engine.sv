@@ -2,8 +2,8 @@
 // motion_engine -- compute velocity, profile, servo and motor steps of all axes of a node in one
 // datapath, one axis after the other at each servo tick.
 //
-// latency   `cycles` at most from tick to the last result: 76 and 365 for each axis without
-//           filters, 484 with two filters, 592 with four. The results of an axis come before the
+// latency   `cycles` at most from tick to the last result: 70 and 365 for each axis without
+//           filters, 480 with two filters, 584 with four. The results of an axis come before the
 //           next step of its profile is prepared, which is the last third of its time.
 // rate      a tick when the one before has been served, else overrun is reported and what the axes
 //           show is not certain; between two ticks one request of an axis per 20 to 70 cycles
@@ -15,7 +15,8 @@
 // method    One adder of 72 bits, one multiplier of 35 bits and one memory, controlled by the
 //           microcode of tables/engine_microcode.py. A line is fetched, its operand is read in the
 //           next cycle and added in the one after. The words of an axis, its queue, its settings
-//           and its filters are in the memory; the flags are loaded with each axis.
+//           and its filters are in the memory; the flags are loaded with each axis. What comes from
+//           outside and what comes from memory are combined by OR: the one that is not meant is 0.
 // behaviour All axes are sampled in the cycle of the tick, and starts that were requested before it
 //           begin at it. A start makes the profile move at once; the first tick only prepares.
 //           Requests are served between two ticks, in the order shift, set_target_to_position,
@@ -30,6 +31,8 @@
 //           velocity and 3 the measured velocity in 2^-16 period/tick, 4 following error in 2^-16
 //           period (flag: above following_limit), 5 command (flag: at its limit), 6 target in 2^-16
 //           motor step (flag: restart there), 7 underrun.
+//           A setting is written within 100 cycles between two ticks, and before the next axis is
+//           served during a tick.
 // limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units:
 //           gains 2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16 command, integral_limit
 //           2^-24 command, coefficients 2^-32, stop_deceleration 2^-40 period/tick2, trim_scale
@@ -56,7 +59,7 @@ module motion_engine #(
     input  wire         [        6:0] setting_word,            // number of its word
     input  wire         [        1:0] setting_filter,          // number of its filter
     input  wire signed  [       63:0] setting,                 // value
-    output logic                      setting_waits,           // level: it is not written yet
+    output logic                      setting_waits,           // level: it must stay as it is
     // the axes
     input  wire         [48*AXES-1:0] position,                // 2^-16 period, of each axis
     input  wire         [   AXES-1:0] stepped,                 // strobes: position made a step
@@ -96,21 +99,21 @@ module motion_engine #(
     localparam int A = $clog2(AXES) + WORD_W;
 
     // as in tables/engine_microcode.py
-    localparam [3:0] TEST = 4'd1, BELOW = 4'd2, ABOVE = 4'd3, SHIFT_8 = 4'd4, SHIFT_24 = 4'd5;
-    localparam [3:0] X = 4'd6, X_LOW = 4'd7, X_HIGH = 4'd8, Y = 4'd9, Y_LOW = 4'd10;
-    localparam [3:0] Y_HIGH = 4'd11, DIVIDE = 4'd12, UPWARD = 4'd13, ALONG = 4'd14;
-    localparam [3:0] PRODUCT = 4'd1, PRODUCT_HIGH = 4'd2, PRODUCT_LOW = 4'd3, HALVE = 4'd4;
-    localparam [3:0] POSITION = 4'd5, ELAPSED = 4'd6, PERIOD = 4'd7, NOW = 4'd8, FLAGS = 4'd9;
-    localparam [3:0] SHIFT_BY = 4'd10;
+    localparam [3:0] TEST = 4'd1, BELOW = 4'd2, ABOVE = 4'd3, SHIFT_8 = 4'd4, X = 4'd5;
+    localparam [3:0] X_LOW = 4'd6, X_HIGH = 4'd7, Y = 4'd8, Y_LOW = 4'd9, DIVIDE = 4'd10;
+    localparam [3:0] UPWARD = 4'd11, ALONG = 4'd12;
+    localparam int PRODUCT = 1, PRODUCT_HIGH = 2, PRODUCT_LOW = 3, HALVE = 4, POSITION = 5;
+    localparam int ELAPSED = 6, PERIOD = 7, NOW = 8, FLAGS = 9, SHIFT_BY = 10, SETTING = 11;
     localparam [7:0] LOAD_CONTEXT = 8'h20, SAMPLE = 8'h23;
     localparam [7:0] STAND = 8'h24, POP = 8'h26, PUSH = 8'h27, EMPTY = 8'h28;
     localparam [7:0] BOOTED = 8'h29, FIRST_FILTER = 8'h2A, NEXT_FILTER = 8'h2B;
-    localparam [2:0] SET = 3'd2, CLEAR = 3'd3, GIVE = 3'd4, DONE = 3'd6;
+    localparam [1:0] SET_OR_CLEAR = 2'd1;
+    localparam [2:0] GIVE = 3'd4, DONE = 3'd6;
     localparam [2:0] COMMAND = 3'd5, STEPS = 3'd6;
     localparam int HALTING = 19, LIMITED_UP = 10, LIMITED_DOWN = 11, REBASED = 13;
     localparam int UPWARDS = 14;
     localparam [15:0] MOTION = 16'b0000_0000_1111_1110;  // the flags that STAND clears
-    localparam [5:0] NOWHERE = 6'h3F;
+    localparam [5:0] OF_SETTING = 6'h37, NOWHERE = 6'h3F;
 
     // the axis that is served, and its flags; 16 and above are cleared with each axis
     wire  [ 2:0] axis;
@@ -126,7 +129,8 @@ module motion_engine #(
     logic axis_asked, axis_gains;
     // time
     logic [31:0] seen_now;
-    logic [23:0] elapsed, period;
+    logic [23:0] elapsed;  // cycles since the last tick
+    logic [23:0] period;
 
     // what the axes show
     localparam int SEEN = 88;  // bits that an axis shows
@@ -135,14 +139,12 @@ module motion_engine #(
     wire  [   SEEN*4-1:0] of_four = axis[2] ? of_eight[SEEN*4+:SEEN*4] : of_eight[0+:SEEN*4];
     wire  [   SEEN*2-1:0] of_two = axis[1] ? of_four[SEEN*2+:SEEN*2] : of_four[0+:SEEN*2];
     wire  [     SEEN-1:0] of_axis = axis[0] ? of_two[SEEN+:SEEN] : of_two[0+:SEEN];
-    wire  [         23:0] elapsed_now = tick ? '0 : elapsed == '1 ? elapsed : elapsed + 1'b1;
 
     // the lines in work: fetched, and its operand is being read; then the operand is there; then it
     // is added
     wire  [         35:0] code;
     wire  [          7:0] action_e;
-    logic [          3:0] source;  // of the operand: 0 memory or nothing
-    logic                 reads;  // the operand is in memory
+    logic [         15:0] source;  // of the operand: the bit of its number; none: memory
     logic [5:0] word, word_e;
     logic with_acc, sign, sign_e;
     logic [3:0] effect, effect_e;
@@ -154,7 +156,6 @@ module motion_engine #(
     wire        [ 6:0] operand = code[12:6];
     wire        [72:0] wide = {acc, 1'b1} + {term, sign_e};
     wire        [71:0] sum = wide[72:1];
-    wire               negative_now = effect_e == TEST ? sum[71] : negative;
     wire               off = level[2] && level[3];
 
     engine_sequencer #(
@@ -180,7 +181,7 @@ module motion_engine #(
             1'b0,
             axis_asked,
             2'd0,
-            negative_now,
+            negative,
             3'd0,
             flags
         }),
@@ -192,52 +193,33 @@ module motion_engine #(
         .cycles
     );
 
-    // addresses of words
+    // addresses of words; where nothing is read from memory, a word that is 0
     logic [7:0] read_word, write_word;
     wire [3:0] tail = head + queued[3:0];
 
     always_comb begin
         casez (operand)
-            7'b0??_????: read_word = operand[6] ? '0 : {2'd0, operand[5:0]};
+            7'b0??_????: read_word = {2'd0, operand[5:0]};
             7'b100_????: read_word = {2'b01, operand[3:0], 2'b11};
             7'b101_????: read_word = {2'b10, filter[1:0], operand[3:0]};
             7'b110_0???: read_word = {2'b01, head, operand[1:0]};
-            default:     read_word = {4'd0, flags[HALTING], operand[2:0]};
+            7'b110_1???: read_word = {3'd0, flags[HALTING], 2'b00, operand[1:0]};
+            default:     read_word = 8'h7F;
         endcase
         casez (word_e)
-            6'b11_00??: write_word = {4'd0, flags[HALTING], 1'b0, word_e[1:0]};
+            6'b11_00??: write_word = {3'd0, flags[HALTING], 2'b00, word_e[1:0]};
             6'b11_01??: write_word = {2'b01, tail, word_e[1:0]};
             6'b11_1???: write_word = {2'b10, filter[1:0], word_e[3:0]};
             default:    write_word = {2'd0, word_e};
         endcase
     end
 
-    wire              write;
-    wire [WORD_W+2:0] write_at;
-    wire [      71:0] written;
+    wire        writes_setting = word_e == OF_SETTING;
+    wire        write = word_e != NOWHERE && (!writes_setting || setting_waits);
+    wire [ 1:0] setting_bank = setting_word[6] ? setting_filter : setting_word[5:4];
+    wire [ 7:0] setting_at = {setting_word[6], 1'b0, setting_bank, setting_word[3:0]};
+    wire [10:0] write_at = writes_setting ? {setting_axis, setting_at} : {axis, write_word};
 
-    engine_settings #(
-        .WORD_W(WORD_W)
-    ) u_settings (
-        .clk,
-        .rst,
-        // settings
-        .setting_write,
-        .setting_axis,
-        .setting_word,
-        .setting_filter,
-        .setting,
-        .waits       (setting_waits),
-        // the engine
-        .operand,
-        .write       (word_e != NOWHERE),
-        .write_at    ({axis, write_word[WORD_W-1:0]}),
-        .word        (sum),
-        // to the memory
-        .write_out   (write),
-        .write_out_at(write_at),
-        .word_out    (written)
-    );
     engine_memory #(
         .AXES  (AXES),
         .WORD_W(WORD_W)
@@ -246,8 +228,8 @@ module motion_engine #(
         .read_at (A'({axis, read_word[WORD_W-1:0]})),
         .stored,
         .write,
-        .write_at(write_at[A-1:0]),
-        .word    (written)
+        .write_at(A'({write_at[10:8], write_at[WORD_W-1:0]})),
+        .word    (sum)
     );
 
     // the operand
@@ -258,31 +240,22 @@ module motion_engine #(
         .product
     );
 
-    wire         minus = sign ^ (effect == ALONG && !flags[UPWARDS]);
-    logic [71:0] from;
-    logic [47:0] outside;
+    wire minus = sign ^ (effect == ALONG && !flags[UPWARDS]);
+    wire  [71:0] multiplied = ({72{source[PRODUCT]}} & {{2{product[69]}}, product})
+        | ({72{source[PRODUCT_HIGH]}} & {product[39:0], 32'd0})
+        | ({72{source[PRODUCT_LOW]}} & {{34{product[69]}}, product[69:32]});
+    wire  [47:0] outside = ({48{source[POSITION]}} & axis_position)
+        | ({48{source[ELAPSED]}} & {24'd0, axis_elapsed}) | ({48{source[PERIOD]}} & {24'd0, period})
+        | ({48{source[NOW]}} & {16'd0, seen_now})
+        | ({48{source[FLAGS]}} & {23'd0, queued, head, flags[15:0]})
+        | ({48{source[SHIFT_BY]}} & shift_by);
+    wire  [71:0] from = stored | multiplied | {{24{outside[47]}}, outside}
+        | ({72{source[SETTING]}} & {{8{setting[63]}}, setting});
 
-    always_comb begin
-        case (source)
-            POSITION: outside = axis_position;
-            ELAPSED:  outside = {24'd0, axis_elapsed};
-            PERIOD:   outside = {24'd0, period};
-            NOW:      outside = {16'd0, seen_now};
-            FLAGS:    outside = {23'd0, queued, head, flags[15:0]};
-            SHIFT_BY: outside = shift_by;
-            default:  outside = '0;
-        endcase
-        case (source)
-            PRODUCT:      from = {{2{product[69]}}, product};
-            PRODUCT_HIGH: from = {product[39:0], 32'd0};
-            PRODUCT_LOW:  from = {{34{product[69]}}, product[69:32]};
-            default:      from = reads ? stored : {{24{outside[47]}}, outside};
-        endcase
-    end
-
-    // requests
+    // flags and requests
+    wire sets = action_e[7:6] == SET_OR_CLEAR;
     wire [20:0] named = 21'd1 << action_e[4:0];
-    wire [ 6:0] done = action_e[7:5] == DONE ? 7'd1 << action_e[2:0] : '0;
+    wire [6:0] done = action_e[7:5] == DONE ? 7'd1 << action_e[2:0] : '0;
 
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         engine_inputs u_inputs (
@@ -290,7 +263,7 @@ module motion_engine #(
             .rst,
             .tick,
             .sample(action_e == SAMPLE && axis == 3'(n) && !busy),
-            .elapsed(elapsed_now),
+            .elapsed,
             .position(position[48*n+:48]),
             .stepped(stepped[n]),
             .downward(downward[n]),
@@ -318,7 +291,7 @@ module motion_engine #(
     end
 
 
-    wire unused = &{1'b0, code, wide[0], requested[6], read_word, write_word, write_at};
+    wire unused = &{1'b0, code, wide[0], requested[6], read_word, write_at};
 
     always_ff @(posedge clk) begin
         // the operand is read
@@ -326,30 +299,27 @@ module motion_engine #(
         with_acc <= code[5];
         sign     <= code[4];
         effect   <= code[3:0];
-        source   <= operand[6:4] == 3'd7 ? operand[3:0] : '0;
-        reads    <= operand[6:4] != 3'd7;
+        source   <= operand[6:4] == 3'd7 ? 16'd1 << operand[3:0] : '0;
 
         // the operand is there
         word_e   <= word;
-        sign_e   <= source == HALVE ? sign : minus;
+        sign_e   <= source[HALVE] ? sign : minus;
         effect_e <= effect;
-        term     <= source == HALVE ? {term[71], term[71:1]} : from ^ {72{minus}};
+        term     <= source[HALVE] ? {term[71], term[71:1]} : from ^ {72{minus}};
 
         // it is added
-        negative <= negative_now;
+        if (effect_e == TEST) negative <= sum[71];
         if (effect_e == UPWARD) flags[UPWARDS] <= sum[71];
         if (!with_acc || (effect_e == BELOW && !sum[71]) || (effect_e == ABOVE && sum[71]))
             acc <= '0;
         else if (effect_e != DIVIDE || !sum[71])
-            acc <= effect_e == SHIFT_8 ? {{8{sum[71]}}, sum[71:8]} :
-                   effect_e == SHIFT_24 ? {{24{sum[71]}}, sum[71:24]} : sum;
+            acc <= effect_e == SHIFT_8 ? {{8{sum[71]}}, sum[71:8]} : sum;
         case (effect_e)
             X:       x <= sum[34:0];
             X_LOW:   x <= {3'd0, sum[31:0]};
             X_HIGH:  x <= sum[66:32];
             Y:       y <= sum[34:0];
             Y_LOW:   y <= {3'd0, sum[31:0]};
-            Y_HIGH:  y <= sum[66:32];
             DIVIDE:  y <= {y[33:0], !sum[71]};
             default: ;
         endcase
@@ -369,8 +339,7 @@ module motion_engine #(
             NEXT_FILTER:  filter <= filter + 1'b1;
             default:      ;
         endcase
-        if (action_e[7:5] == SET) flags <= flags | named;
-        if (action_e[7:5] == CLEAR) flags <= flags & ~named;
+        for (int n = 0; n <= 20; n++) if (sets && named[n]) flags[n] <= !action_e[5];
         result_valid <= action_e[7:5] == GIVE;
         if (action_e[7:5] == GIVE) begin
             result      <= sum[47:0];
@@ -387,17 +356,21 @@ module motion_engine #(
         {axis_gains, axis_asked, level, requested, axis_elapsed, axis_position} <= of_axis;
 
         // time
-        elapsed <= elapsed_now;
         if (tick) begin
-            period   <= elapsed == '1 ? elapsed : elapsed + 1'b1;
+            elapsed  <= 24'd1;
+            period   <= elapsed;
             seen_now <= now;
-        end
+        end else if (elapsed != '1) elapsed <= elapsed + 1'b1;
+
+        // the setting that waits
+        setting_waits <= setting_write || (setting_waits && !writes_setting);
 
         if (rst) begin
-            {source, reads} <= '0;
+            source <= '0;
             {word, word_e} <= '1;
             {effect, effect_e} <= '0;
-            {filter, flags, elapsed, period, ready, result_valid} <= '0;
+            {filter, flags, period, ready, result_valid, setting_waits} <= '0;
+            elapsed <= 24'd1;
         end
     end
 endmodule

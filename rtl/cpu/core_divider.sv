@@ -48,10 +48,12 @@ module core_divider #(
     logic [W-1:0] quotient;  // bits of the magnitude of a that are not used yet, then the quotient
 
     // An amount is a number without its sign. The remainder minus the amount of b, and whether it
-    // is 0 or more; the lowest bits of both operands make the carry that a subtraction needs.
-    wire [W:0] wide = {remainder, quotient[W-1]};
-    wire [W:0] subtrahend = {b_negative, b} ^ {W + 1{!b_negative}};
-    wire [W+2:0] sum = {wide, 1'b1} + {subtrahend, !b_negative};
+    // is 0 or more; at the beginning, the amount of a, which is added to a remainder of 0. The
+    // lowest bits of both operands make the carry that a subtraction needs.
+    wire [W:0] wide = {remainder, busy && quotient[W-1]};
+    wire minus = busy ? !b_negative : a_negative;
+    wire [W:0] operand = {1'b1, (busy ? b : a) ^ {W{minus}}};
+    wire [W+2:0] sum = {wide, 1'b1} + {operand, minus};
     wire [W-1:0] difference = sum[W:1];
     wire fits = sum[W+2];
     wire unused = &{1'b0, sum[W+1], sum[0]};
@@ -69,17 +71,18 @@ module core_divider #(
         if (!busy) begin
             busy      <= working && !ready;
             left      <= C'(W);
-            remainder <= '0;
-            quotient  <= (a ^ {W{a_negative}}) + W'(a_negative);
+            quotient  <= difference;
         end else if (left == '0) begin
-            busy <= 1'b0;
+            busy      <= 1'b0;
+            remainder <= '0;
         end else begin
             remainder <= fits ? difference : wide[W-1:0];
             quotient  <= {quotient[W-2:0], fits};
         end
         if (rst) begin
-            busy  <= 1'b0;
-            ready <= 1'b0;
+            busy      <= 1'b0;
+            ready     <= 1'b0;
+            remainder <= '0;
         end
     end
 
@@ -109,6 +112,7 @@ module core_divider #(
         if (past) begin
             assert (!busy || (working && !ready && left <= W && waited == W + 1 - left));
             assert (busy || ready || waited == '0);
+            assert (busy || remainder == '0);
         end
         cover (past && ready && of_remainder && a_negative && result != '0);
         cover (past && ready && overflow);

@@ -17,7 +17,7 @@
 //           the look-ahead address of the core would reach the block RAMs late.
 // source    PicoRV32, from the package pythondata_cpu_picorv32; the address of a word of data is
 //           its operand pcpi_rs1 one cycle early
-// model     tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
+// model     tb/cpu/soft_core.py, the results of the program tb/cpu/soft_test.c
 // proved    Whatever the core does: an access to no valid address raises trap in the next cycle,
 //           and trap stays high until rst. select is a strobe, only for an access to a whole word
 //           of the registers, only one cycle after ready was high, never for an instruction, and

@@ -97,7 +97,10 @@ module index_latch #(
         logic [W-1:0] reference, turn;  // count at the preceding index; counts since then
 
         wire on = each && counts_per_revolution != '0;
-        wire one_turn = turn == counts_per_revolution || turn == -counts_per_revolution;
+        // x + y is 0 if each of its bits takes the carry of the bit below, which is x | y there
+        wire [W-1:0] carry = {turn[W-2:0] | counts_per_revolution[W-2:0], 1'b0};
+        wire up = turn == counts_per_revolution;
+        wire down = (turn ^ counts_per_revolution) == carry;
 
         always_ff @(posedge clk) begin
             if (take) zeroed <= clears;
@@ -105,7 +108,7 @@ module index_latch #(
             judge            <= take && known && on;
             turn             <= index_count - reference;
             judge_q          <= judge;
-            revolution_wrong <= judge_q && turn != '0 && !one_turn;
+            revolution_wrong <= judge_q && turn != '0 && !up && !down;
             known            <= on && (known || take);
             if (rst) begin
                 known            <= 1'b0;

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // bridge_pwm -- make edge-aligned sign-magnitude PWM for an H-bridge driver with two inputs.
 //
-// latency   10 cycles from valid to the first period border that applies the command. Both pins are
+// latency   4 cycles from valid to the first period border that applies the command. Both pins are
 //           low 1 cycle after enable falls.
-// rate      one command per 9 cycles; a command that comes sooner replaces the one before it. Any
-//           period is allowed.
+// rate      one command per cycle; the last one before a border is applied. Any period is allowed.
 // accuracy  A period drives for |command| * period / 2^15 cycles. The fraction of a cycle is
 //           carried into the next period (first-order noise shaping), so that over any number of
 //           periods the driven time is right to 1 cycle in total.
@@ -30,71 +29,53 @@ module bridge_pwm (
     output logic              bridge_a,  // level: pin; alone high while a positive command drives
     output logic              bridge_b   // level: pin; alone high while a negative command drives
 );
-    // the multiplier: |command| * period, in 2^-15 cycle
-    logic busy, asked_reverse;
-    logic [2:0] step;
-    logic [15:0] asked_period, multiplier;
-    logic [30:0] multiplicand, product;
+    // the last command
+    logic asked_reverse;
+    logic [15:0] asked_period, amount;
 
     // the period that begins at the next border
     logic        next_reverse;
     logic [15:0] next_period;
-    logic [30:0] next_on;  // 2^-15 cycle
+    logic [31:0] next_on;  // 2^-15 cycle
 
     // the running period
     logic powered, reverse;  // powered: the period is not 0
-    logic [15:0] left, on_left;  // cycles after this one: of the period, of its pulse
+    logic [15:0] length, elapsed, on;  // cycles: of the period, before this one, of its pulse
     logic [14:0] fraction;  // 2^-15 cycle that are still to be driven
 
-    wire  [30:0] single = multiplier[0] ? multiplicand : '0;
-    wire  [30:0] double = multiplier[1] ? multiplicand << 1 : '0;
-    wire  [30:0] sum = product + single + double;
-    wire  [15:0] shaped = {1'b0, next_on[14:0]} + {1'b0, fraction};
-    wire  [15:0] on = next_on[30:15] + {15'd0, shaped[15]};
-
-    wire         border = left == 16'd0;
-    wire         drives = border ? on != 16'd0 : on_left != 16'd0;
-    wire         direction = border ? next_reverse : reverse;
-    wire         on_power = border ? next_period != 16'd0 : powered;
+    wire  [31:0] due = next_on + 32'(fraction);
+    wire  [15:0] next_elapsed = elapsed + 1'b1;
+    wire         border = !powered || next_elapsed == length;
+    wire         drives = elapsed < on;
+    wire         unused = &{1'b0, due[31]};
 
     always_ff @(posedge clk) begin
         if (valid) begin
-            busy          <= 1'b1;
-            step          <= '0;
             asked_reverse <= command[15];
             asked_period  <= period;
-            multiplier    <= command[15] ? -command : command;
-            multiplicand  <= {15'd0, period};
-            product       <= '0;
-        end else if (busy) begin
-            step         <= step + 1'b1;
-            multiplier   <= multiplier >> 2;
-            multiplicand <= multiplicand << 2;
-            product      <= sum;
-            if (step == 3'd7) begin
-                busy         <= 1'b0;
-                next_reverse <= asked_reverse;
-                next_period  <= asked_period;
-                next_on      <= sum;
-            end
+            amount        <= command[15] ? -command : command;
+        end
+        next_reverse <= asked_reverse;
+        next_period  <= asked_period;
+        next_on      <= amount * asked_period;
+
+        elapsed      <= next_elapsed;
+        if (border) begin
+            elapsed  <= '0;
+            length   <= next_period;
+            powered  <= next_period != 16'd0;
+            reverse  <= next_reverse;
+            on       <= due[30:15];
+            fraction <= due[14:0];
         end
 
-        left    <= !border ? left - 1'b1 : next_period == 16'd0 ? 16'd0 : next_period - 1'b1;
-        on_left <= (border ? on : on_left) - {15'd0, drives};
-        reverse <= direction;
-        powered <= on_power;
-        if (border) fraction <= shaped[14:0];
-
-        bridge_a <= on_power && !(drives && direction);
-        bridge_b <= on_power && !(drives && !direction);
+        bridge_a <= powered && !(drives && reverse);
+        bridge_b <= powered && !(drives && !reverse);
         if (rst || !enable) begin
-            busy         <= 1'b0;
+            asked_period <= '0;
+            amount       <= '0;
             next_period  <= '0;
             next_on      <= '0;
-            next_reverse <= 1'b0;
-            left         <= '0;
-            on_left      <= '0;
-            reverse      <= 1'b0;
             powered      <= 1'b0;
             fraction     <= '0;
             bridge_a     <= 1'b0;
@@ -109,12 +90,11 @@ module bridge_pwm (
         if (!past) assume (rst);
         if (past) begin
             if (!$past(enable)) assert (!bridge_a && !bridge_b);
-            if ($past(left) != 0 && $past(enable) && !$past(rst))
-                assert (reverse == $past(reverse));
-            if (bridge_a && !bridge_b) assert (!reverse);
-            if (bridge_b && !bridge_a) assert (reverse);
-            if (!powered) assert (!bridge_a && !bridge_b);
-            cover (bridge_b && !bridge_a && left != 0);
+            if (!$past(border) && $past(enable) && !$past(rst)) assert (reverse == $past(reverse));
+            if (bridge_a && !bridge_b) assert (!$past(reverse));
+            if (bridge_b && !bridge_a) assert ($past(reverse));
+            if (!$past(powered)) assert (!bridge_a && !bridge_b);
+            cover (bridge_b && !bridge_a && !border);
             cover (bridge_a && bridge_b);
         end
     end

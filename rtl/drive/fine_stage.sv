@@ -2,8 +2,8 @@
 // fine_stage -- control the fine stage: a PI loop with the same target as the main servo, which
 // drives the DAC.
 //
-// latency  53 cycles from tick to command
-// rate     one command per tick, a tick at least 53 cycles after the one before
+// latency  101 cycles from tick to command, 125 in a tick in which the integral is retaken
+// rate     one command per tick, a tick at least 125 cycles after the one before
 // behaviour  While the fine stage does not hold the position, its command returns to the middle by
 //          RETURN in each tick. That is slow enough for the main servo to follow. When the fine
 //          stage takes over, its loop continues from the command that it has at that moment.
@@ -29,9 +29,9 @@ module fine_stage #(
     output logic signed [15:0] command,        // full scale 2^15
     output logic               saturated       // level: it holds, and its command is at its limit
 );
-    wire signed [15:0] highest = {1'b0, limit};
-    wire signed [15:0] closer = command > RETURN ? command - RETURN :
-                                command < -RETURN ? command + RETURN : 16'sd0;
+    wire signed [15:0] moved = command + (command[15] ? RETURN : -RETURN);
+    wire signed [15:0] closer = moved[15] == command[15] ? moved : 16'sd0;
+    wire               at_limit;
 
     pi_loop u_loop (
         .clk,
@@ -47,10 +47,11 @@ module fine_stage #(
         .position,
         .open_command(enable ? closer : 16'sd0),
         .valid,
-        .command
+        .command,
+        .at_limit
     );
 
-    assign saturated = hold && (command == highest || command == -highest);
+    assign saturated = hold && at_limit;
 endmodule
 
 `default_nettype wire

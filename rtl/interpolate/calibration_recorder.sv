@@ -46,56 +46,55 @@ module calibration_recorder #(
 
     localparam int A = $clog2(DEPTH);
 
-    logic [31:0] burst     [0:DEPTH-1];
-    logic        recording;
-    logic [A-1:0] kept, next;  // words recorded; address of the word to be read
-    logic [15:0] left;  // strobes to skip
-    logic        half;  // the earlier phase of a word has been recorded
-    logic [15:0] earlier;
+    logic [ 31:0] burst                                                                [0:DEPTH-1];
+    logic         recording;
+    logic [A-1:0] place;  // words recorded; then the address of the word to be read
+    logic         first;  // nothing has been recorded since start
+    logic [ 15:0] passed;  // strobes since the last one that was recorded
+    logic         half;  // the earlier phase of a word has been recorded
+    logic [ 15:0] earlier;
 
-    wire         strobe = phases ? phase_valid : sampled;
-    wire         due = recording && strobe && left == '0;
-    wire         keep = due && (!phases || half);
-    wire  [15:0] sin_16 = 16'(sin) << (16 - W);
-    wire  [15:0] cos_16 = 16'(cos) << (16 - W);
+    wire  [ 15:0] sin_16 = 16'(sin) << (16 - W);
+    wire  [ 15:0] cos_16 = 16'(cos) << (16 - W);
+    wire          strobe = recording && (phases ? phase_valid : sampled);
+    wire  [ 15:0] passing = passed + 1'b1;
+    wire          due = strobe && (first || passing == decimation || decimation == '0);
+    wire          keep = due && (!phases || half);
 
     always_ff @(posedge clk) begin
-        if (keep) burst[kept] <= phases ? {phase, earlier} : {cos_16, sin_16};
-        word <= burst[next];
+        // one port: a burst is read when it is complete
+        if (keep) burst[place] <= phases ? {phase, earlier} : {cos_16, sin_16};
+        else word <= burst[place];
     end
 
     always_ff @(posedge clk) begin
         if (recording && disturbed) invalid <= 1'b1;
-        if (recording && strobe)
-            left <= left != '0 ? left - 1'b1 : decimation == '0 ? '0 : decimation - 1'b1;
+        if (strobe) passed <= due ? '0 : passing;
         if (due) begin
-            half    <= phases && !half;
+            first <= 1'b0;
+            half  <= phases && !half;
             earlier <= phase;
         end
-        if (keep) begin
-            kept <= kept + 1'b1;
-            if (&kept) begin
-                recording <= 1'b0;
-                full      <= 1'b1;
-            end
+        if (keep && &place) begin
+            recording <= 1'b0;
+            full      <= 1'b1;
         end
-        if (full && read) next <= next + 1'b1;
+        if (keep || (full && read)) place <= place + 1'b1;
         if (start) begin
             recording <= 1'b1;
             full      <= 1'b0;
             invalid   <= 1'b0;
-            kept      <= '0;
-            next      <= '0;
-            left      <= '0;
+            place     <= '0;
+            passed    <= '0;
+            first     <= 1'b1;
             half      <= 1'b0;
         end
         if (rst) begin
             recording <= 1'b0;
             full      <= 1'b0;
             invalid   <= 1'b0;
-            kept      <= '0;
-            next      <= '0;
-            left      <= '0;
+            place     <= '0;
+            passed    <= '0;
             half      <= 1'b0;
         end
     end
@@ -115,11 +114,12 @@ module calibration_recorder #(
             assert (!(full && recording));
             assert (count <= (A + 2)'(2 * DEPTH));
             assert (full == (count == (A + 2)'(2 * DEPTH)));
-            assert (kept == A'(count >> 1) && half == count[0] && (phases || !half));
+            if (!full) assert (place == A'(count >> 1));
+            assert (half == count[0] && (phases || !half));
             assert (invalid == seen);
         end
         if (past && !$past(rst) && !$past(start) && $past(full)) begin
-            assert (full && !$past(keep) && invalid == $past(invalid));
+            assert (full && !keep && invalid == $past(invalid));
             cover (word == 32'h5678_1234);
         end
     end

@@ -30,37 +30,40 @@ module correction_settings #(
     output logic [16:0] gain,  // factor, 1.0 = 2^16
     output logic signed [16:0] quadrature_error  // factor, 1.0 = 2^16
 );
-    logic [AXES-1:0] offset_known, gain_known, quadrature_error_known;  // written since reset
     wire [31:0] offset_stored;
     wire [16:0] gain_stored, quadrature_error_stored;
 
-    axis_memory #(
+    axis_setting #(
         .AXES (AXES),
         .WIDTH(32)
     ) u_offset (
         .clk,
+        .rst,
         .write     (offset_written),
         .write_axis(setting_axis),
         .value     (setting),
         .axis      (setting_axis),
         .stored    (offset_stored)
     );
-    axis_memory #(
-        .AXES (AXES),
-        .WIDTH(17)
+    axis_setting #(
+        .AXES   (AXES),
+        .WIDTH  (17),
+        .INITIAL(17'd65536)
     ) u_gain (
         .clk,
+        .rst,
         .write     (gain_written),
         .write_axis(setting_axis),
         .value     (setting[16:0]),
         .axis      (setting_axis),
         .stored    (gain_stored)
     );
-    axis_memory #(
+    axis_setting #(
         .AXES (AXES),
         .WIDTH(17)
     ) u_quadrature_error (
         .clk,
+        .rst,
         .write     (quadrature_error_written),
         .write_axis(setting_axis),
         .value     (setting[16:0]),
@@ -74,18 +77,7 @@ module correction_settings #(
         {cos_offset, sin_offset} <= offset_stored;
         gain                     <= gain_stored;
         quadrature_error         <= $signed(quadrature_error_stored);
-        if (!offset_known[setting_axis]) {cos_offset, sin_offset} <= '0;
-        if (!gain_known[setting_axis]) gain <= 17'd65536;
-        if (!quadrature_error_known[setting_axis]) quadrature_error <= '0;
-        if (offset_written) offset_known[setting_axis] <= 1'b1;
-        if (gain_written) gain_known[setting_axis] <= 1'b1;
-        if (quadrature_error_written) quadrature_error_known[setting_axis] <= 1'b1;
-        if (rst) begin
-            load_out               <= 1'b0;
-            offset_known           <= '0;
-            gain_known             <= '0;
-            quadrature_error_known <= '0;
-        end
+        if (rst) load_out <= 1'b0;
     end
 endmodule
 

@@ -36,54 +36,49 @@ module fringe_tracker #(
     output logic [15:0] phase_out,  // 2^-16 period: the phase after step; held until done
     output logic overspeed  // strobe, with done: a quarter period or more off
 );
-    localparam signed [15:0] QUARTER = 16'sd16384;
-
-    logic [AXES-1:0] started;
-    wire             outlier;  // the last phase was an overspeed
-    // predicted_phase = last + predicted_step
-    wire [15:0] last, predicted_phase;
-    wire signed  [16:0] speed;  // step per sample, without outliers
+    logic       [AXES-1:0] started;
+    wire                   outlier;  // the last phase was an overspeed
+    wire        [    15:0] last;
+    wire signed [    16:0] speed;  // step per sample, without outliers
     // speed, or after an outlier the step that leads back to the line
-    wire signed  [17:0] predicted_step;
+    wire signed [    17:0] predicted_step;
 
-    wire                known = started[axis];
-    wire signed  [15:0] deviation = $signed(phase - predicted_phase);
-    wire signed  [18:0] measured_step = 19'(predicted_step) + 19'(deviation);
-    wire                near = deviation > -QUARTER && deviation < QUARTER;
-    wire                fits = measured_step[18:16] == {3{measured_step[16]}};
-    wire signed  [15:0] nearest = $signed(phase - last);
+    wire                   known = started[axis];
+    wire        [    15:0] moved = phase - last;  // the step, modulo a period
+    // It borrows if moved is less than the fraction of a period in predicted_step.
+    wire                   borrow;
+    wire signed [    15:0] deviation;  // from the predicted phase
+    assign {borrow, deviation} = {1'b0, moved} - {1'b0, predicted_step[15:0]};
+    // predicted_step + deviation is moved and so many periods; no adder is needed for its fraction
+    wire signed  [ 2:0] periods = 3'(predicted_step >>> 16) - 3'(deviation[15]) + 3'(borrow);
+    // less than a quarter period; equal fractions show -QUARTER before the difference is there
+    wire                same_fraction = moved[13:0] == predicted_step[13:0];
+    wire                near = deviation[15] == deviation[14] && !(deviation[15] && same_fraction);
+    wire                fits = periods == '0 || periods == '1;
     wire                follows = known && fits && near;
     wire                strays = known && fits && !near && !outlier;
+    wire signed  [16:0] measured_step = {periods[0], moved};  // if it fits
+    wire signed  [17:0] step_back = 18'(speed) - 18'(deviation);
 
     // state after this phase
     logic signed [16:0] new_speed;
-    logic signed [17:0] new_predicted_step;
-    logic        [15:0] new_predicted_phase;
+    wire signed  [17:0] new_predicted_step = strays ? step_back : 18'(new_speed);
     always_comb begin
-        new_speed           = '0;
-        new_predicted_step  = '0;
-        new_predicted_phase = phase;
-        if (follows) begin
-            new_speed           = outlier ? speed : measured_step[16:0];
-            new_predicted_step  = 18'(new_speed);
-            new_predicted_phase = outlier ? phase + speed[15:0] : {phase[14:0], 1'b0} - last;
-        end else if (strays) begin
-            new_speed           = speed;
-            new_predicted_step  = 18'(speed) - 18'(deviation);
-            new_predicted_phase = predicted_phase + speed[15:0];
-        end
+        new_speed = '0;
+        if (follows && !outlier) new_speed = measured_step;
+        else if (follows || strays) new_speed = speed;
     end
 
     axis_memory #(
         .AXES (AXES),
-        .WIDTH(68)
+        .WIDTH(52)
     ) u_state (
         .clk,
         .write     (valid),
         .write_axis(axis),
-        .value     ({strays, new_speed, new_predicted_step, new_predicted_phase, phase}),
+        .value     ({strays, new_speed, new_predicted_step, phase}),
         .axis,
-        .stored    ({outlier, speed, predicted_step, predicted_phase, last})
+        .stored    ({outlier, speed, predicted_step, last})
     );
 
     always_ff @(posedge clk) begin
@@ -92,9 +87,8 @@ module fringe_tracker #(
         if (valid) begin
             started[axis] <= 1'b1;
             phase_out     <= phase;
+            step          <= {follows || strays ? periods[0] : moved[15], moved};
             if (!known) step <= '0;
-            else if (follows || strays) step <= measured_step[16:0];
-            else step <= 17'(nearest);
         end
         if (rst) begin
             started   <= '0;
@@ -105,14 +99,16 @@ module fringe_tracker #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    localparam signed [15:0] QUARTER = 16'sd16384;
+    wire signed [18:0] wide_step = {periods, moved};
+    logic              past = 1'b0;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         assume (axis == '0);
         if (past && started) begin
-            assert (predicted_phase == 16'(last + predicted_step[15:0]));
             assert (phase_out == last);
+            assert (wide_step == 19'(predicted_step) + 19'(deviation));
         end
         if (past && !$past(rst)) begin
             assert (done == $past(valid));

@@ -52,14 +52,16 @@ module harmonic_correction #(
     logic [8:0] odd_weight, odd_weight_q, even_weight_q;  // 2^-8
     logic signed [26:0] odd_part, even_part;
     logic [15:0] phase_q, phase_qq, phase_qqq;
-    logic acts_q, acts_qq, acts_qqq, read, weighed, multiplied;
+    logic acts_q, acts_qq, read, weighed, multiplied;
 
     wire                swap_here = swap && axis == table_axis;
     wire                in_force = page[axis] ^ swap_here;
     wire                spare = !(page[table_axis] ^ swap);  // the table that can be written
     wire        [  6:0] even_point = phase[15:9] + 7'(phase[8]);
-    wire signed [ 26:0] sum = even_part + odd_part + 27'sd2048;
-    wire signed [ 14:0] change = 15'(sum >>> 12);  // rounded to 2^-16 period
+    wire signed [ 26:0] sum = even_part + odd_part;  // 2^-28 period
+    // The correction is rounded by its next bit.
+    wire        [ 15:0] change = 16'(sum >>> 12);  // 2^-16 period
+    wire        [ 15:0] corrected = 16'(({phase_qqq, 1'b1} + {~change, !sum[11]}) >> 1);
 
     wire                store = waits && !valid;
     wire        [B-1:0] even_at = store ? entry : B'({axis, in_force, even_point, 1'b0});
@@ -90,11 +92,11 @@ module harmonic_correction #(
         end
         if (weighed) begin
             phase_qqq <= phase_qq;
-            acts_qqq  <= acts_qq;
             even_part <= 27'(even_q * $signed({1'b0, even_weight_q}));
             odd_part  <= 27'(odd_q * $signed({1'b0, odd_weight_q}));
+            if (!acts_qq) {even_part, odd_part} <= '0;
         end
-        if (multiplied) phase_out <= phase_qqq - (acts_qqq ? 16'(change) : 16'd0);
+        if (multiplied) phase_out <= corrected;
         waits <= write || (waits && valid);
         if (write) begin
             entry       <= B'({table_axis, spare, point});

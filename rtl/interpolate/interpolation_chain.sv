@@ -5,11 +5,12 @@
 // latency  21 cycles from valid to done for one axis. With several axes 22 cycles for the axis that
 //          is served first, 1 cycle more for each axis with a lower number whose sample waits, too:
 //          21 + AXES at most; 4 cycles less without harmonics
-// rate     one sample per cycle, of all axes together
+// rate     one sample per cycle, of all axes together; with one axis, one per SAMPLE_CYCLES
 // behaviour  All axes share the arithmetic. State and settings of each axis are in LUT RAM, its
-//          harmonic tables in block RAM. The samples of each axis must be AXES cycles apart, or one
-//          may be lost; see sample_arbiter. SAMPLE_CYCLES of the converter below AXES stop the
-//          build. overrun reports a loss at once, so that the fault of the interlock comes before
+//          harmonic tables in block RAM. The samples of each axis must be SAMPLE_CYCLES apart, or
+//          one may be lost; see sample_arbiter and, for one axis, arctan_quotient, which is built
+//          small if they are 12 or more. SAMPLE_CYCLES of the converter below AXES stop the build.
+//          overrun reports a loss at once, so that the fault of the interlock comes before
 //          any event of the axis, and lost says in the next cycle whose sample it was. A setting
 //          is the word of its register, and acts on the samples that are served after it.
 // source   the chain of S0, once for a node
@@ -72,7 +73,6 @@ module interpolation_chain #(
     logic [ 31:0] value;
     logic [A-1:0] setting_axis;
     logic [  7:0] written;  // strobes of setting_axis
-    logic [AXES-1:0] outlier_known, limit_known;  // written since reset
     wire [7:0] outlier_step, outlier_hold;
     wire [ 19:0] limit;
     wire         load_values;
@@ -89,7 +89,7 @@ module interpolation_chain #(
     logic [A-1:0] filtered_axis;
     wire signed [W-1:0] served_sin, served_cos;
     wire signed [15:0] corrected_sin, corrected_cos;
-    wire [15:0] amplitude, straight_phase;
+    wire        [15:0] straight_phase;
     wire signed [31:0] tracked_count = $signed(count[32*tracked_axis+:32]);
 
     if (AXES == 1) begin : g_one
@@ -116,22 +116,24 @@ module interpolation_chain #(
     end
 
     // settings
-    axis_memory #(
+    axis_setting #(
         .AXES (AXES),
         .WIDTH(16)
     ) u_outlier_settings (
         .clk,
+        .rst,
         .write     (written[0]),
         .write_axis(setting_axis),
         .value     (value[31:16]),
         .axis      (served_axis),
         .stored    ({outlier_hold, outlier_step})
     );
-    axis_memory #(
+    axis_setting #(
         .AXES (AXES),
         .WIDTH(20)
     ) u_limit (
         .clk,
+        .rst,
         .write     (written[1]),
         .write_axis(setting_axis),
         .value     (value[19:0]),
@@ -166,7 +168,7 @@ module interpolation_chain #(
         .clk,
         .rst,
         // settings
-        .step    (outlier_known[served_axis] ? outlier_step : 8'd0),
+        .step    (outlier_step),
         .hold    (outlier_hold),
         // sample
         .valid   (served),
@@ -202,9 +204,8 @@ module interpolation_chain #(
         .sin_out(corrected_sin),
         .cos_out(corrected_cos)
     );
-    arctan_pipelined #(
-        .W    (16),
-        .STEPS(2)
+    arctan_quotient #(
+        .SAMPLE_CYCLES(AXES == 1 ? SAMPLE_CYCLES : 1)
     ) u_arctan (
         .clk,
         .rst,
@@ -214,8 +215,7 @@ module interpolation_chain #(
         .cos  (corrected_cos),
         // phase
         .done (found),
-        .phase(plain_phase),
-        .amplitude
+        .phase(plain_phase)
     );
     if (HAS_HARMONICS != 0) begin : g_harmonics
         harmonic_correction #(
@@ -268,7 +268,7 @@ module interpolation_chain #(
         .axis (tracked_axis),
         .step,
         .count(tracked_count),
-        .limit(limit_known[tracked_axis] ? limit : 20'd0),
+        .limit,
         .disagreement
     );
 
@@ -296,18 +296,12 @@ module interpolation_chain #(
         filtered_axis <= served_axis;
         lost          <= overruns;
         axes          <= {axes[A*(CYCLES-1)-1:0], filtered_axis};
-        if (written[0]) outlier_known[setting_axis] <= 1'b1;
-        if (written[1]) limit_known[setting_axis] <= 1'b1;
         if (rst) begin
             filtered_axis <= '0;
             lost          <= '0;
             axes          <= '0;
-            outlier_known <= '0;
-            limit_known   <= '0;
         end
     end
-
-    wire unused = &{1'b0, amplitude};
 endmodule
 
 `default_nettype wire

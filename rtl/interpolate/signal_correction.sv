@@ -39,8 +39,8 @@ module signal_correction #(
     end
 
     logic centred, multiplied;  // strobes
-    logic [AXES-1:0] loaded;  // the axis has settings since reset
-    wire signed [15:0] sin_centre, cos_centre;
+    // settings of the axis
+    wire signed [15:0] sin_zero, cos_zero;
     wire        [16:0] sin_gain;
     wire signed [16:0] cos_part_of_sin;
     logic signed [17:0] sin_factor, cos_factor;  // of the sample that is centred
@@ -49,25 +49,26 @@ module signal_correction #(
 
     wire signed [15:0] sin_wide = 16'(sin) <<< (16 - W);
     wire signed [15:0] cos_wide = 16'(cos) <<< (16 - W);
-    wire               known = loaded[axis];
-    wire signed [15:0] sin_zero = known ? sin_centre : 16'sd0;
-    wire signed [15:0] cos_zero = known ? cos_centre : 16'sd0;
-    wire signed [35:0] sum = 36'(sin_part) + 36'(cos_part) + 36'sd65536;
-    wire signed [18:0] sin_half = 19'(sum >>> 17);  // rounded
+    wire signed [35:0] sum = 36'(sin_part) + 36'(cos_part);
+    // The rounding has an adder of its own: one sum of three numbers would take more cells.
+    wire signed [19:0] sin_whole = 20'(sum >>> 16);
+    wire signed [18:0] sin_half = 19'((sin_whole + 20'sd1) >>> 1);
     wire signed [16:0] cos_half = 17'((18'(cos_kept) + 18'sd1) >>> 1);
     wire               sin_fits = sin_half[18:15] == {4{sin_half[18]}};
     wire               cos_fits = cos_half[16] == cos_half[15];
 
-    axis_memory #(
-        .AXES (AXES),
-        .WIDTH(66)
+    axis_setting #(
+        .AXES   (AXES),
+        .WIDTH  (66),
+        .INITIAL({16'd0, 16'd0, 17'd65536, 17'd0})
     ) u_settings (
         .clk,
+        .rst,
         .write     (load),
         .write_axis(load_axis),
         .value     ({sin_offset, cos_offset, gain, quadrature_error}),
         .axis,
-        .stored    ({sin_centre, cos_centre, sin_gain, cos_part_of_sin})
+        .stored    ({sin_zero, cos_zero, sin_gain, cos_part_of_sin})
     );
 
     always_ff @(posedge clk) begin
@@ -77,8 +78,8 @@ module signal_correction #(
         if (valid) begin
             sin_channel <= 17'(sin_wide) - 17'(sin_zero);
             cos_channel <= 17'(cos_wide) - 17'(cos_zero);
-            sin_factor  <= known ? $signed({1'b0, sin_gain}) : 18'sd65536;
-            cos_factor  <= known ? 18'(cos_part_of_sin) : 18'sd0;
+            sin_factor  <= $signed({1'b0, sin_gain});
+            cos_factor  <= 18'(cos_part_of_sin);
         end
         if (centred) begin
             sin_part <= sin_channel * sin_factor;
@@ -89,14 +90,12 @@ module signal_correction #(
             sin_out <= sin_fits ? sin_half[15:0] : {sin_half[18], {15{!sin_half[18]}}};
             cos_out <= cos_fits ? cos_half[15:0] : {cos_half[16], {15{!cos_half[16]}}};
         end
-        if (load) loaded[load_axis] <= 1'b1;
         if (rst) begin
             centred    <= 1'b0;
             multiplied <= 1'b0;
             done       <= 1'b0;
             sin_out    <= '0;
             cos_out    <= '0;
-            loaded     <= '0;
         end
     end
 endmodule

@@ -146,6 +146,7 @@ module sine_channel #(
             interpolation_chain #(
                 .AXES         (1),
                 .W            (W),
+                .SAMPLE_CYCLES(2 * ADC_FRAME + 1),
                 .HAS_HARMONICS(HAS_HARMONICS)
             ) u_chain (
                 .clk,

@@ -30,29 +30,26 @@ module spi_word_sender (
     localparam [5:0] RAISE = 6'd33, LAST = 6'd35;
 
     logic [5:0] half;
-    // cycles of a half, less one; cycles left after this one
-    logic [7:0] length, left;
+    logic [7:0] length, elapsed;  // cycles of a half; of those, the ones up to this one
     logic [15:0] shifted;  // the highest bit is on sdi
 
-    wire  [ 7:0] new_length = half_period == 8'd0 ? 8'd0 : half_period - 1'b1;
     wire  [ 5:0] next = half + 1'b1;
+    wire         ends = elapsed >= length;  // the half ends
 
     assign sdi = shifted[15];
 
     always_ff @(posedge clk) begin
         sent <= 1'b0;
-        left <= left - 1'b1;
+        elapsed <= ready || ends ? 8'd1 : elapsed + 1'b1;
         if (ready) begin
             half   <= '0;
-            length <= new_length;
-            left   <= new_length;
+            length <= half_period;
             if (valid) begin
                 ready   <= 1'b0;
                 cs_n    <= 1'b0;
                 shifted <= word;
             end
-        end else if (left == 8'd0) begin
-            left <= length;
+        end else if (ends) begin
             half <= next;
             sclk <= next[0] && next < RAISE;
             if (!next[0] && next < RAISE - 1'b1) shifted <= shifted << 1;
@@ -91,7 +88,7 @@ module spi_word_sender (
                 if (!ready && !cs_n)
                     assert (rises + {4'd0, sclk && !$past(sclk)} == (half[5:1] + {4'd0, half[0]}));
             end
-            cover (sent && length == 8'd0);
+            cover (sent && length == 8'd1);
         end
     end
 `endif

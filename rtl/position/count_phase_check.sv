@@ -5,7 +5,8 @@
 // latency  3 cycles from valid to disagreement
 // rate     one step per cycle
 // method   The steps of the position are added up, and the count is subtracted. The difference is 0
-//          when both move alike, wherever the origin is: a shift of the origin changes nothing.
+//          when both move alike, wherever the origin is: a shift of the origin changes nothing. It
+//          is exact modulo 2^16 periods; so many lost ones in a row would not be seen.
 // behaviour  The position at which both agree is learned from the first step after reset or after
 //          `learn`, and from every step while limit is 0. With AXES above 1 it serves several axes;
 //          step, count and limit must be those of the axis of the step.
@@ -34,12 +35,12 @@ module count_phase_check #(
     input  wire        [    19:0] limit,        // 2^-16 period; 0: not checked
     output logic       [AXES-1:0] disagreement  // levels: the two differ by more than limit
 );
-    localparam int D = 46;  // bits of the difference; the count wraps at 2^32 / 4 periods
+    localparam int D = 32;  // bits of the difference, which wraps at 2^16 periods
 
     logic [AXES-1:0] known;
     logic measured, compared, learned, learned_q;
     logic [A-1:0] axis_q, axis_qq;
-    logic [31:0] count_q;
+    logic [D-15:0] count_q;
     logic [19:0] limit_q, limit_qq;
     logic        [D-1:0] moved_q;
     logic signed [D-1:0] difference;
@@ -48,9 +49,12 @@ module count_phase_check #(
     wire         [D-1:0] travelled;
     wire         [D-1:0] moved = travelled + D'(step);
     wire                 learns = !known[axis] || limit == '0;
+    wire                 negative = difference[D-1];
+    // the size; one less if negative
+    wire         [D-1:0] size = negative ? ~difference : difference;
     // beyond 2^20 it is too large for any limit
-    wire                 far = difference[D-1:20] != {(D - 20) {difference[D-1]}};
-    wire         [ 20:0] size = difference[D-1] ? -difference[20:0] : difference[20:0];
+    wire                 far = size[D-1:20] != '0;
+    wire                 beyond = {size[19:0], negative} > {limit_qq, 1'b0};
 
     axis_memory #(
         .AXES (AXES),
@@ -59,7 +63,7 @@ module count_phase_check #(
         .clk,
         .write     (valid),
         .write_axis(axis),
-        .value     (learns ? {count, 14'b0} : moved),
+        .value     (learns ? {count[D-15:0], 14'b0} : moved),
         .axis,
         .stored    (travelled)
     );
@@ -69,14 +73,14 @@ module count_phase_check #(
         axis_q     <= axis;
         learned    <= learns;
         moved_q    <= moved;
-        count_q    <= count;
+        count_q    <= count[D-15:0];
         limit_q    <= limit;
         compared   <= measured;
         axis_qq    <= axis_q;
         learned_q  <= learned;
         limit_qq   <= limit_q;
-        difference <= moved_q - {count_q, 14'b0};
-        if (compared) disagreement[axis_qq] <= !learned_q && (far || size > 21'(limit_qq));
+        difference <= {moved_q[D-1:14] - count_q, moved_q[13:0]};
+        if (compared) disagreement[axis_qq] <= !learned_q && (far || beyond);
         known <= (known | (AXES'(valid) << axis)) & ~learn;
         if (rst) begin
             known        <= '0;
@@ -86,22 +90,25 @@ module count_phase_check #(
         end
     end
 
+    wire unused = &{1'b0, count[31:D-14]};
+
 `ifdef FORMAL
-    (* anyconst *)logic        alike;  // the steps are those of the count
-    logic        past = 1'b0;
-    logic [31:0] last;  // count at the last step
-    wire  [45:0] travelled_count = {count - last, 14'b0};
+    (* anyconst *)logic          alike;  // the steps are those of the count
+    logic          past = 1'b0;
+    logic [  31:0] last;  // count at the last step
+    wire  [  45:0] travelled_count = {count - last, 14'b0};
+    wire  [D-15:0] last_q = last[D-15:0];
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         assume (axis == '0);
         if (valid) last <= count;
-        if (alike && valid) assume (D'(step) == travelled_count);
+        if (alike && valid) assume (46'(step) == travelled_count);
         if (past) begin
             if (compared && limit_qq == 0) assert (learned_q);
             if ($past(compared) && $past(limit_qq) == 0) assert (!disagreement);
             if (alike) begin
-                if (known) assert (travelled == {last, 14'b0});
+                if (known) assert (travelled == {last_q, 14'b0});
                 if (measured && !learned) assert (moved_q == {count_q, 14'b0});
                 if (compared && !learned_q) assert (difference == 0);
                 assert (!disagreement);

@@ -13,7 +13,8 @@
 //          one by one, in order and without omission, as soon as it has ended: such pulses are
 //          exactly gap_length apart, and each of them is reported by late. With step = 0 there is
 //          one point, passed upwards. A shift of the origin leaves the points where they are on
-//          the scale.
+//          the scale; start refers to the origin in the cycle after arm. armed falls one cycle
+//          after passed has counted the last point.
 // model    tb/position/position_compare.py, equal in every bit of every cycle
 // proved   the numbers of pulses and of points passed are always equal; a pulse begins only when
 //          the farthest position has reached its point, and at once unless another pulse or gap is
@@ -42,83 +43,82 @@ module position_compare (
     output logic              late,           // strobe, with the start of a delayed pulse
     output logic       [31:0] passed          // points passed since arm, wraps
 );
-    logic        [31:0] origin;  // periods that the origin has moved since reset
+    logic        [31:0] origin;  // periods that the origin has moved since arm
     logic               arrived;  // `here` is new
-    // The position relative to the origin at reset. It and all below are mirrored if step is
-    // negative, so that the points always lie upwards.
-    logic signed [47:0] here;
-    // reach is valid: a position before the first point was seen
-    logic               ready;
-    // farthest position; the next point; magnitude of step
-    logic signed [47:0] reach, point, stride;
-    logic down, single;  // down: step is negative; single: step is 0
-    // points to come, less one; a count of 0 (no end) wraps
-    logic [31:0] left;
-    logic        endless;
+    logic signed [47:0] here;  // the position, with the origin at arm, like reach and point
+    // seen: reach is a position since arm; ready: it was a position before the first point
+    logic seen, ready;
+    // the last position; while a point is due, the farthest one
+    logic signed [47:0] reach;
+    logic signed [47:0] point, stride;  // the next point; distance between points
+    logic down, single;  // down: stride is negative; single: it is 0
+    logic [31:0] points;  // count, at arm
+    logic stepped, wrapped;  // stepped: passed is new; wrapped: it has begun again at 0
     // resting: the gap after a pulse; waited: the point had to wait for it
     logic resting, waited;
-    logic [23:0] timer;  // cycles left of the pulse or gap, less one
+    logic [23:0] timer;  // cycles left of the pulse or gap, this one included; 0 acts as 1
 
     /* verilator lint_off UNUSEDSIGNAL */  // of a distance only its sign counts
-    wire  [47:0] beyond = reach - point;  // negative: not reached
-    wire  [47:0] ahead = here - point;  // the same for the present position
-    wire  [47:0] farther = here - reach;
+    // less 1 going down, so that its sign differs from `down` where the point is reached
+    wire  [48:0] beyond = {reach, 1'b0} - {point, down};
+    wire  [48:0] farther = {here, 1'b0} - {reach, down};
     /* verilator lint_on UNUSEDSIGNAL */
-    wire         due = armed && ready && !beyond[47];
-    wire         busy = pulse || (resting && timer != '0);
+    wire         reached = beyond[48] == down;
+    wire         due = armed && ready && reached;
+    wire         running = (pulse || resting) && timer[23:1] != '0;  // not its last cycle
+    wire         busy = pulse || running;
     wire         begins = due && !busy && !arm && !disarm;
+    wire  [32:0] passed_next = {1'b0, passed} + 33'd1;
+    wire         done = stepped && (single || {wrapped, passed} == {1'b0, points});
 
     always_ff @(posedge clk) begin
         if (shift) origin <= origin + shift_periods;
         arrived <= valid && !arm;
-        here    <= {position[47:16] - origin, position[15:0]} ^ {48{down}};
+        here    <= {position[47:16] - origin, position[15:0]};
 
-        if (arrived && ready && !farther[47]) reach <= here;
-        if (arrived && !ready && ahead[47]) begin
-            ready <= armed;
-            reach <= here;
-        end
+        if (arrived && (farther[48] == down || !(ready && reached))) reach <= here;
+        seen  <= seen || arrived;
+        ready <= ready || (seen && !reached);
 
-        late   <= begins && waited;
-        waited <= due && busy;
+        late    <= begins && waited;
+        waited  <= due && busy;
+        stepped <= begins;
         if (begins) begin
-            point  <= point + stride;
-            passed <= passed + 1'b1;
-            left   <= left - 1'b1;
-            if (single || (!endless && left == '0)) armed <= 1'b0;
+            point <= point + stride;
+            passed <= passed_next[31:0];
+            wrapped <= wrapped || passed_next[32];
         end
+        if (done) armed <= 1'b0;
 
-        timer <= timer - 1'b1;
-        if (pulse && timer == '0) begin
-            pulse   <= 1'b0;
-            resting <= 1'b1;
-            timer   <= gap_length == '0 ? '0 : gap_length - 1'b1;
-        end else if (begins) begin
-            pulse   <= 1'b1;
-            resting <= 1'b0;
-            timer   <= pulse_length == '0 ? '0 : pulse_length - 1'b1;
-        end else if (resting && timer == '0) resting <= 1'b0;
+        timer <= running ? timer - 1'b1 : pulse ? gap_length : pulse_length;
+        if (!running) begin
+            pulse   <= begins;
+            resting <= pulse;
+        end
 
         if (arm) begin
-            armed   <= 1'b1;
+            origin  <= '0;
+            seen    <= 1'b0;
             ready   <= 1'b0;
-            point   <= {start[47:16] - origin, start[15:0]} ^ {48{step[47]}};
-            stride  <= (step ^ {48{step[47]}}) + {47'b0, step[47]};
+            armed   <= 1'b1;
+            point   <= start;
+            stride  <= step;
             down    <= step[47];
             single  <= step == '0;
-            left    <= count - 1'b1;
-            endless <= count == '0;
+            points  <= count;
+            wrapped <= 1'b0;
             passed  <= '0;
             waited  <= 1'b0;
         end
         if (disarm) armed <= 1'b0;
         if (rst) begin
-            origin  <= '0;
             arrived <= 1'b0;
+            seen    <= 1'b0;
             ready   <= 1'b0;
             armed   <= 1'b0;
             waited  <= 1'b0;
             late    <= 1'b0;
+            stepped <= 1'b0;
             passed  <= '0;
             pulse   <= 1'b0;
             resting <= 1'b0;
@@ -133,6 +133,7 @@ module position_compare (
     logic [23:0] high_for, low_for;
     // lengths in force at the start of the pulse and of its gap; 0 acts as 1
     logic [23:0] pulse_taken, gap_taken;
+    wire [23:0] left = timer == 0 ? 24'd1 : timer;  // cycles left, this one included
     wire        rises = pulse && !high;
     wire [31:0] pulses_now = pulses + 32'(rises);
     always @(posedge clk) begin
@@ -144,7 +145,7 @@ module position_compare (
         if (!past) assume (rst);
         if (begins) pulse_taken <= pulse_length + 24'(pulse_length == 0);
         if (rst) gap_taken <= 1;
-        else if (pulse && timer == 0) gap_taken <= gap_length + 24'(gap_length == 0);
+        else if (pulse && timer <= 1) gap_taken <= gap_length + 24'(gap_length == 0);
         if (past) begin
             assert (pulses_now == passed);
             assert (!(pulse && resting));
@@ -152,10 +153,10 @@ module position_compare (
             if (high && !pulse) assert (high_for == pulse_taken);
             if (rises) assert (low_for >= gap_taken);
             if (pulse) begin
-                assert (timer < pulse_taken && high_for == pulse_taken - 1'b1 - timer);
+                assert (left <= pulse_taken && high_for == pulse_taken - left);
                 assert (high == (high_for != 0));
             end else if (resting) begin
-                assert (timer < gap_taken && low_for == gap_taken - 1'b1 - timer);
+                assert (left <= gap_taken && low_for == gap_taken - left);
             end else begin
                 assert (low_for >= gap_taken);
             end
@@ -163,13 +164,13 @@ module position_compare (
         if (past && !$past(rst)) begin
             if (rises) begin
                 // the point of the pulse had been reached
-                assert ($past(armed) && $past(ready) && !$past(beyond[47]));
+                assert ($past(armed) && $past(ready) && $past(reached));
                 assert (point == $past(point) + $past(stride) && passed == $past(passed) + 1);
             end
             if ($past(due) && !$past(busy) && !$past(arm) && !$past(disarm)) assert (rises);
-            // reach never moves back
-            if ($past(ready) && ready && !$past(arm)) begin
-                assert (!(48'(reach - $past(reach)) >> 47));
+            // a position that has reached its point is followed by farther ones only
+            if ($past(ready && reached) && reach != $past(reach)) begin
+                assert ($past(down) != !(48'(reach - $past(reach)) >> 47));
             end
             cover (rises && late && passed == 2 && down);
             cover (rises && low_for == 4 && gap_taken == 4 && late);

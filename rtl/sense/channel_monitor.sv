@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// channel_monitor -- find faults of one channel (sine or cosine) of a signal from its samples, the
-// other channel and the comparators.
+// channel_monitor -- find faults of the channels (sine and cosine) of a signal from their samples
+// and their comparators.
 //
-// latency  1 cycle from valid to every flag
-// rate     one sample per cycle
-// behaviour channel_stuck: the channel stays within `band` of one sample for four or more samples
+// latency  12 cycles from valid to done and every flag
+// rate     one sample per 12 cycles; one that comes sooner is not seen
+// behaviour One subtractor and one comparator check the cosine, then the sine. A flag is high if
+//          either of them has the fault.
+//          jump: a channel moves by more than `jump` and twice the distance of the preceding
+//          sample, which is the larger one of both channels.
+//          channel_stuck: the channel stays within `band` of one sample for four or more samples
 //          while the other channel is more than `span` away, twice within four samples. Near the
 //          top of a circle of amplitude A a good channel also stays within `band`, but there the
 //          other channel moves by 4 sqrt(A band) at most. no_noise: the channel has the same code
@@ -18,134 +22,209 @@
 // model    tb/sense/channel_monitor.py, equal in every bit of every cycle
 // proved   a comparator that has the sign of every sample is never reported as comparator_mismatch
 //          or comparator_stuck, whatever the settings are
-// proof    depth 12
+// proof    depth 40
 `default_nettype none
 
 module channel_monitor #(
     parameter int W = 8  // bits of a sample, 8 to 16
 ) (
-    input  wire                clk,
-    input  wire                rst,                  // level: clears all flags and the history
-    input  wire        [ 15:0] clip_level,           // counts: largest good magnitude; 65535: off
-    input  wire        [  7:0] band,                 // counts: largest noise of a channel at rest
-    input  wire        [ 15:0] span,                 // counts: motion of the other; 65535: off
-    input  wire        [ 15:0] no_noise_samples,     // samples with the same code; 0: off
-    input  wire        [ 15:0] sign_threshold,       // counts: beyond it a sign is sure; 65535: off
-    input  wire                valid,                // strobe: channel and other are new
-    input  wire signed [W-1:0] channel,              // counts, full scale = 2^(W-1)
-    input  wire signed [W-1:0] other,                // counts: the other channel
-    input  wire                level,                // level: comparator of channel, 1 above 0
-    input  wire                other_level,          // level: comparator of the other channel
-    output logic               clipped,              // level: this sample is beyond clip_level
-    output logic               channel_stuck,        // level: until the channel leaves the band
-    output logic               no_noise,             // level: until the code changes
-    output logic               comparator_mismatch,  // level: at this sample and the two before it
-    output logic               comparator_stuck,     // level: 3 sign changes without its edge
-    output logic               channel_missing       // level: 3 edges without a sign change
+    input wire clk,
+    input wire rst,  // level: clears all flags and the history
+    input wire [15:0] clip_level,  // counts: largest good magnitude; 65535: off
+    input wire [15:0] jump,  // counts: smallest sudden step that is a fault
+    input wire [7:0] band,  // counts: largest noise of a channel at rest
+    input wire [15:0] span,  // counts: motion of the other; 65535: off
+    input wire [15:0] no_noise_samples,  // samples with the same code; 0: off
+    input wire [15:0] sign_threshold,  // counts: beyond it a sign is sure; 65535: off
+    input wire valid,  // strobe: the next four are new
+    input wire signed [W-1:0] sin,  // counts, full scale = 2^(W-1)
+    input wire signed [W-1:0] cos,  // counts, full scale = 2^(W-1)
+    input wire a,  // level: comparator of cos, 1 above 0
+    input wire b,  // level: comparator of sin, 1 above 0
+    output logic done,  // strobe: the flags belong to a new sample
+    output logic clipped,  // level, with done: beyond clip_level
+    output logic jumped,  // level, with done: beyond the distance allowed
+    output logic channel_stuck,  // level, with done: until it leaves the band
+    output logic no_noise,  // level, with done: until the code changes
+    output logic comparator_mismatch,  // level, with done: for three samples
+    output logic comparator_stuck,  // level, with done: 3 sign changes, no edge
+    output logic channel_missing  // level, with done: 3 edges, no sign change
 );
     if (W < 8 || W > 16) begin : g_check
         W_MUST_BE_FROM_8_TO_16 u_error ();
     end
 
-    logic                started;  // there was a sample
-    logic signed [W-1:0] last;
-    // band around the sample at which the channel rests; span around the other channel
-    logic signed [17:0] rest_low, rest_high, far_low, far_high;
-    logic [ 1:0] stayed;  // samples since then, up to 3
-    // samples for which the last excursion of the other channel counts
-    logic [ 1:0] recent;
-    logic [15:0] same;  // samples since the code changed
-    logic [1:0] sign, sign_q;  // signs of the last two samples: 1 plus, 3 minus, 0 unsure
-    logic [1:0] side;  // the last sure sign
-    // edge_other: other_level at the last change of level
-    logic level_q, edge_other;
-    // sign changes of the channel since its comparator changed; half periods of the comparators
-    // since the channel changed its sign; both up to 3
-    logic [1:0] changes, turns;
+    // 0: idle; difference 1 to 5 of the cosine, 6 to 10 of the sine; judged in the next step
+    logic [3:0] step;
+    logic started, followed;  // there was a sample, there were two
+    logic signed [W-1:0] sin_q, cos_q;
+    logic [     1:0] levels;  // of the comparators, {b, a}
+    wire             second = step > 4'd6;  // the sine is judged
 
-    wire [W-1:0] size = channel < 0 ? -channel : channel;
-    wire         at_rest = started && 18'(channel) >= rest_low && 18'(channel) <= rest_high;
-    wire         far = span != '1 && (18'(other) < far_low || 18'(other) > far_high);
-    wire [  1:0] sign_now = 17'(size) <= {1'b0, sign_threshold} ? 2'd0 : {channel[W-1], 1'b1};
-    wire         sure = sign_now[0] && sign == sign_now && sign_q == sign_now;
-    wire         crossing = sign_now[0] && side[0] && sign_now != side;
-    wire         toggled = started && level != level_q;
-    wire [ 15:0] same_now = !started || channel != last ? '0 : &same ? same : same + 1'b1;
-    wire         half_period = toggled && other_level != edge_other;
-    wire [  1:0] changes_next = changes == 2'd3 ? changes : changes + 1'b1;
-    wire [  1:0] turns_next = turns == 2'd3 ? turns : turns + 1'b1;
-    wire [  1:0] changes_now = toggled ? 2'd0 : crossing ? changes_next : changes;
-    wire [  1:0] turns_now = crossing ? 2'd0 : half_period ? turns_next : toggled ? 2'd0 : turns;
+    // From each channel are subtracted: 0, 0, the value at which it rests, its last value; from the
+    // other channel the value that it had then. They move on by one place in each step.
+    logic [W*10-1:0] places;
+    logic signed [W-1:0] channel_q, place_q;
+    logic signed [W:0] difference;
+    wire signed [W-1:0] channel = step >= 4'd5 && step <= 4'd9 ? sin_q : cos_q;
+    wire signed [W-1:0] place = places[W-1:0];
+
+    // The difference is compared with the limit.
+    logic [17:0] limit;
+    logic renew;  // the channel takes the place of what was subtracted
+    logic [17:0] allowed;  // largest distance that is no jump
+    wire negative = difference[W];
+    wire [W:0] steps = negative ? ~difference : difference;  // the size; one less if negative
+    wire beyond = {18'(steps), negative} > {limit, 1'b0};
+    wire for_sign = step == 4'd2 || step == 4'd7;
+    wire for_clip = step == 4'd3 || step == 4'd8;
+    wire for_band = step == 4'd4 || step == 4'd9;
+    wire for_jump = step == 4'd5 || step == 4'd10;
+    wire for_span = step == 4'd6 || step == 4'd11;
+
+    always_comb begin
+        case (step)
+            4'd2, 4'd7: limit = 18'(sign_threshold);
+            4'd3, 4'd8: limit = 18'(clip_level);
+            4'd4, 4'd9: limit = 18'(band);
+            4'd5, 4'd10: limit = allowed;
+            default: limit = 18'(span);
+        endcase
+        renew = for_jump || (for_band && (beyond || !started)) || (for_span && !at_rest);
+    end
+
+    // Of the channel that has moved further since the preceding sample: twice the distance, one
+    // less if it is negative.
+    logic [W+1:0] moved;
+
+    // what is known of a channel
+    typedef struct packed {
+        logic channel_stuck;
+        logic no_noise;
+        logic comparator_mismatch;
+        logic comparator_stuck;
+        logic channel_missing;
+        logic [1:0] stayed;  // samples at rest, up to 3
+        // samples for which the last excursion of the other channel counts
+        logic [1:0] recent;
+        logic [15:0] same;  // samples since the code changed
+        logic [1:0] sign, sign_q;  // of the last two samples: 1 plus, 3 minus, 0 unsure
+        logic [1:0] side;  // the last sure sign
+        logic level;  // of its comparator
+        logic edge_other;  // the other level at the last change of level
+        // sign changes of the channel since its comparator changed; half periods of the comparators
+        // since the channel changed its sign; both up to 3
+        logic [1:0] changes, turns;
+    } history_t;
+    history_t history, history_q, now;  // the _q is that of the channel that is not judged
+
+    logic at_rest, same_code;
+    logic [1:0] sign;  // of this sample
+    wire        level = levels[second];
+    wire        other_level = levels[!second];
+    wire        sure = sign[0] && history.sign == sign && history.sign_q == sign;
+    wire        crossing = sign[0] && history.side[0] && sign != history.side;
+    wire        toggled = started && level != history.level;
+    wire        half_period = toggled && other_level != history.edge_other;
+    wire  [1:0] changes_next = history.changes == 2'd3 ? 2'd3 : history.changes + 1'b1;
+    wire  [1:0] turns_next = history.turns == 2'd3 ? 2'd3 : history.turns + 1'b1;
+
+    always_comb begin
+        now = history;
+        now.stayed = !at_rest ? 2'd0 : history.stayed == 2'd3 ? 2'd3 : history.stayed + 1'b1;
+        now.recent =
+            !at_rest ? 2'd0 : beyond ? 2'd3 : history.recent == '0 ? 2'd0 : history.recent - 1'b1;
+        now.channel_stuck = at_rest && (history.channel_stuck ||
+                                        (history.stayed[1] && beyond && history.recent != '0));
+        now.same = same_code ? history.same + 1'b1 : '0;
+        now.no_noise = same_code && no_noise_samples != '0 &&
+            (history.no_noise || now.same >= no_noise_samples);
+        {now.sign_q, now.sign} = {history.sign, sign};
+        if (sign[0]) now.side = sign;
+        now.comparator_mismatch = sure && history.level == sign[1];
+        now.level = level;
+        if (toggled) now.edge_other = other_level;
+        now.changes = toggled ? 2'd0 : crossing ? changes_next : history.changes;
+        now.turns =
+            crossing ? 2'd0 : half_period ? turns_next : toggled ? 2'd0 : history.turns;
+        now.comparator_stuck = now.changes == 2'd3;
+        now.channel_missing = now.turns == 2'd3 && now.side[0];
+    end
 
     always_ff @(posedge clk) begin
-        if (valid) begin
-            started <= 1'b1;
-            last    <= channel;
-            clipped <= clip_level != '1 && 17'(size) > {1'b0, clip_level};
-
-            if (!at_rest) begin
-                rest_low  <= 18'(channel) - $signed({10'b0, band});
-                rest_high <= 18'(channel) + $signed({10'b0, band});
-                far_low   <= 18'(other) - $signed({2'b0, span});
-                far_high  <= 18'(other) + $signed({2'b0, span});
-            end
-            stayed   <= !at_rest ? 2'd0 : stayed == 2'd3 ? stayed : stayed + 1'b1;
-            recent  <= !at_rest ? 2'd0 : far ? 2'd3 : recent == '0 ? recent : recent - 1'b1;
-            channel_stuck  <= at_rest && (channel_stuck || (stayed >= 2'd2 && far && recent != '0));
-
-            same    <= same_now;
-            no_noise  <= no_noise_samples != '0 && same_now >= no_noise_samples;
-
-            sign    <= sign_now;
-            sign_q  <= sign;
-            if (sign_now[0]) side <= sign_now;
-            comparator_mismatch <= sure && level_q == channel[W-1];
-
-            level_q <= level;
-            if (toggled) edge_other <= other_level;
-            changes     <= changes_now;
-            turns       <= turns_now;
-            comparator_stuck <= changes_now == 2'd3;
-            channel_missing <= turns_now == 2'd3 && side[0];
+        done <= step == 4'd11;
+        if (valid && step == '0) begin
+            {sin_q, cos_q} <= {sin, cos};
+            levels <= {b, a};
+            allowed <= 18'(jump) + 18'(moved) + 18'(moved[0]);
         end
+        if (valid || step != '0) step <= step == 4'd11 ? '0 : step + 1'b1;
+        if (step != '0) begin
+            places <= {renew ? channel_q : place_q, places[W*10-1:W]};
+            {channel_q, place_q} <= {channel, place};
+            difference <= channel - place;
+        end
+        if (for_sign) sign <= beyond ? {negative, 1'b1} : 2'd0;
+        if (for_clip) clipped <= beyond || (second && clipped);
+        if (for_band) at_rest <= started && !beyond;
+        if (for_jump) begin
+            same_code <= started && difference == '0;
+            jumped <= (followed && beyond) || (second && jumped);
+            if (!second || {steps, negative} > moved) moved <= {steps, negative};
+        end
+        if (for_span) {history_q, history} <= {now, history_q};
+        if (step == 4'd11) {followed, started} <= {started, 1'b1};
         if (rst) begin
-            started     <= 1'b0;
-            clipped     <= 1'b0;
-            channel_stuck      <= 1'b0;
-            no_noise      <= 1'b0;
-            comparator_mismatch     <= 1'b0;
-            comparator_stuck <= 1'b0;
-            channel_missing <= 1'b0;
-            sign        <= 2'd0;
-            sign_q      <= 2'd0;
-            side        <= 2'd0;
-            changes     <= 2'd0;
-            turns       <= 2'd0;
-            edge_other  <= 1'b0;
-            stayed       <= 2'd0;
-            recent      <= 2'd0;
+            step <= '0;
+            done <= 1'b0;
+            places <= '0;
+            {followed, started} <= '0;
+            {clipped, jumped} <= '0;
+            {history_q, history} <= '0;
         end
     end
+    assign channel_stuck = history.channel_stuck || history_q.channel_stuck;
+    assign no_noise = history.no_noise || history_q.no_noise;
+    assign comparator_mismatch = history.comparator_mismatch || history_q.comparator_mismatch;
+    assign comparator_stuck = history.comparator_stuck || history_q.comparator_stuck;
+    assign channel_missing = history.channel_missing || history_q.channel_missing;
 
 `ifdef FORMAL
     logic past = 1'b0;
+    logic [3:0] head;  // the difference for which the first of the places is
+    wire [1:0] seen = {started || second, started};  // there was a sample, for history_q, history
+    wire [1:0] minus = {sin_q[W-1], cos_q[W-1]};
+    history_t both;
+    assign head = step == '0 ? 4'd1 : step;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        if (valid) assume (level == !channel[W-1]);
+        if (valid) assume ({b, a} == ~{sin[W-1], cos[W-1]});
         if (past) begin
             assert (!comparator_mismatch && !comparator_stuck);
             // the further assertions make the claim inductive
-            if (sign[0]) assert (started && level_q == !sign[1]);
-            if (sign_q[0]) assert (started);
-            if (!side[0]) begin
-                assert (changes == 0 && !sign[0]);
-            end else begin
-                assert (started && changes <= (level_q == !side[1]));
+            assert (step <= 4'd11);
+            if (step != '0) assert (levels == ~minus);
+            for (int n = 0; n < 10; n++)
+            if (head + n == 1 || head + n == 2 || head + n == 6 || head + n == 7 ||
+                head + n == 12 || head + n == 13 || head + n == 17 || head + n == 18)
+                assert (places[W*n+:W] == '0);
+            if (for_sign || for_clip) assert (place_q == '0 && difference == (W + 1)'(channel_q));
+            if (for_sign || for_clip) assert (channel_q == (second ? sin_q : cos_q));
+            if ((for_clip || for_band || for_jump || for_span) && sign[0])
+                assert (sign[1] == minus[second]);
+            for (int n = 0; n < 2; n++) begin
+                both = n == 0 ? history : history_q;
+                if (both.sign[0]) assert (seen[n] && both.level == !both.sign[1]);
+                if (both.sign_q[0]) assert (started);
+                if (!both.side[0])
+                    assert (both.changes == 0 && !both.sign[0]);
+                    else assert (seen[n] && both.changes <= (both.level == !both.side[1]));
+                assert (!both.comparator_mismatch && !both.comparator_stuck);
             end
-            cover (crossing && changes == 1);
-            cover (channel_missing);
         end
+        cover (past && for_span && crossing && second);
+        cover (past && for_span && history.turns == 1);
     end
 `endif
 endmodule

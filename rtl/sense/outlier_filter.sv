@@ -43,10 +43,12 @@ module outlier_filter #(
 
     wire signed [  W:0] sin_move = sin - sin_last;
     wire signed [  W:0] cos_move = cos - cos_last;
-    wire signed [  W:0] up = $signed({{(W - 7) {1'b0}}, step});
-    wire signed [  W:0] down = -up;
-    wire                sin_far = sin_move > up || sin_move < down;
-    wire                cos_far = cos_move > up || cos_move < down;
+    // If a channel moves down, its size is one too small; step - size is then reduced by one more.
+    wire        [W-1:0] sin_size = sin_move[W-1:0] ^ {W{sin_move[W]}};
+    wire        [W-1:0] cos_size = cos_move[W-1:0] ^ {W{cos_move[W]}};
+    wire        [  W:0] most = (W + 1)'(step);
+    wire                sin_far = 1'(({most, 1'b1} + {1'b1, ~sin_size, !sin_move[W]}) >> (W + 1));
+    wire                cos_far = 1'(({most, 1'b1} + {1'b1, ~cos_size, !cos_move[W]}) >> (W + 1));
 
     wire                active = taken[axis] && step != '0;
     wire                no_end = hold == '1;

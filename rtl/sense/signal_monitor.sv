@@ -2,9 +2,9 @@
 // signal_monitor -- watch the sine and cosine samples and their comparators, and report each fault
 // by name.
 //
-// latency  2 cycles from valid to bits 2 and 5 to 9, 5 to bit 4, 10 to bits 0 and 1, 14 to bits 3
-//          and 10 to 12, 9 to amplitude; 1 cycle from phase_jump and lost_count to bits 13 and 14
-// rate     one sample per cycle
+// latency  W + 24 cycles from valid to amplitude, ready and bits 0 to 12, which change together; 1
+//          cycle from phase_jump and lost_count to bits 13 and 14
+// rate     one sample per 2 W + 5 cycles, as the shortest frame of dual_adc_reader gives them
 // behaviour The fault bits are 0 too_low, 1 too_high, 2 clipped, 3 off_circle, 4 jump, 5
 //          channel_stuck, 6 no_noise, 7 comparator_mismatch, 8 comparator_stuck, 9
 //          channel_missing, 10 offset_drift, 11 unbalanced, 12 not_in_quadrature, 13 phase_jump,
@@ -12,8 +12,8 @@
 //          sample within 16 and fall after 16 good ones, so a single spike is not reported. jump:
 //          a channel moves by more than twice the distance of the preceding sample (the larger of
 //          both channels) plus `jump`, which no machine can do; the bit stays until the next
-//          sample. A limit of 65535 switches its check off. first holds all faults of the
-//          cycle in which the first one rose.
+//          sample. A limit of 65535 switches its check off. first holds all faults of the cycle in
+//          which the first one rose. A sample that comes too soon is not seen by every check.
 // model    tb/sense/signal_monitor.py, equal in every bit of every cycle
 `default_nettype none
 
@@ -51,87 +51,34 @@ module signal_monitor #(
         W_MUST_BE_FROM_8_TO_16 u_error ();
     end
 
-    // jump detection
-    logic signed [W-1:0] last_sin, last_cos;
-    logic signed [W:0] sin_step, cos_step;
-    logic [W:0] sin_distance, cos_distance, distance;
-    logic [18:0] allowed;  // largest distance that is no jump
-    logic [ 3:0] stepped;  // pipeline of valid
-    logic [ 1:0] seen;  // distances so far, up to 2; the first one has no start
-    logic        jumped;
-
-    always_ff @(posedge clk) begin
-        stepped <= {stepped[2:0], valid};
-        if (valid) begin
-            last_sin <= sin;
-            last_cos <= cos;
-            sin_step <= sin - last_sin;
-            cos_step <= cos - last_cos;
-        end
-        if (stepped[0]) begin
-            sin_distance <= sin_step < 0 ? -sin_step : sin_step;
-            cos_distance <= cos_step < 0 ? -cos_step : cos_step;
-        end
-        if (stepped[1]) distance <= sin_distance > cos_distance ? sin_distance : cos_distance;
-        if (stepped[2]) begin
-            allowed <= 19'({distance, 1'b0}) + 19'(jump);
-            jumped <= seen[1] && jump != '1 && 19'(distance) > allowed;
-            if (!seen[1]) seen <= seen + 1'b1;
-        end
-        if (rst) begin
-            stepped <= '0;
-            seen    <= 2'd0;
-            jumped  <= 1'b0;
-        end
-    end
-
-    // one monitor per channel
-    wire [1:0] clipped, channel_stuck, no_noise;
-    wire [1:0] comparator_mismatch, comparator_stuck, channel_missing;
+    // each channel
+    wire sampled, clipped, jumped, channel_stuck, no_noise;
+    wire comparator_mismatch, comparator_stuck, channel_missing;
 
     channel_monitor #(
         .W(W)
-    ) u_cos (
+    ) u_channels (
         .clk,
         .rst,
         .clip_level,
+        .jump,
         .band,
         .span,
         .no_noise_samples,
         .sign_threshold,
         .valid,
-        .channel            (cos),
-        .other              (sin),
-        .level              (a),
-        .other_level        (b),
-        .clipped            (clipped[0]),
-        .channel_stuck      (channel_stuck[0]),
-        .no_noise           (no_noise[0]),
-        .comparator_mismatch(comparator_mismatch[0]),
-        .comparator_stuck   (comparator_stuck[0]),
-        .channel_missing    (channel_missing[0])
-    );
-    channel_monitor #(
-        .W(W)
-    ) u_sin (
-        .clk,
-        .rst,
-        .clip_level,
-        .band,
-        .span,
-        .no_noise_samples,
-        .sign_threshold,
-        .valid,
-        .channel            (sin),
-        .other              (cos),
-        .level              (b),
-        .other_level        (a),
-        .clipped            (clipped[1]),
-        .channel_stuck      (channel_stuck[1]),
-        .no_noise           (no_noise[1]),
-        .comparator_mismatch(comparator_mismatch[1]),
-        .comparator_stuck   (comparator_stuck[1]),
-        .channel_missing    (channel_missing[1])
+        .sin,
+        .cos,
+        .a,
+        .b,
+        .done(sampled),
+        .clipped,
+        .jumped,
+        .channel_stuck,
+        .no_noise,
+        .comparator_mismatch,
+        .comparator_stuck,
+        .channel_missing
     );
 
     // both channels together
@@ -176,66 +123,54 @@ module signal_monitor #(
         .not_in_quadrature
     );
 
-    // sized: the flags of the length are new; sampled: those of the channels are new
-    logic too_low, too_high, sized, sampled;
+    // report a fault at the second bad sample within 16: five faults one after the other
+    wire             too_low = (low >> W) != '0 || low[W-1:0] > length[W-1:0];
+    wire             too_high = (high >> W) == '0 && high[W-1:0] < length[W-1:0];
+    wire  [4:0]      bad = {off_circle, too_high, too_low, comparator_mismatch, clipped};
+    logic [2:0]      turn;  // 0: idle; from 2 on fault turn - 2 of bad
+    // of each fault, the one whose turn it is at the right: it is reported; samples for which its
+    // last bad one still counts
+    logic [4:0][5:0] reports;
+    wire             reported = reports[0][5];
+    wire  [4:0]      left = reports[0][4:0];
+    wire             now_bad = bad[turn-3'd2];
+    wire  [4:0]      left_now = now_bad ? 5'd16 : left == '0 ? '0 : left - 1'b1;
+    wire             report = now_bad ? left != '0 : reported && left > 5'd1;
+
     always_ff @(posedge clk) begin
-        sized   <= measured;
-        sampled <= valid;
-        if (measured) begin
-            amplitude <= length;
-            too_low   <= length < low;
-            too_high  <= high != '1 && length > high;
-        end
+        if (measured) turn <= 3'd1;
+        else if (turn != '0) turn <= turn == 3'd6 ? '0 : turn + 1'b1;
+        if (turn > 3'd1) reports <= {report, left_now, reports[4:1]};
         if (rst) begin
-            sized     <= 1'b0;
-            sampled   <= 1'b0;
-            amplitude <= '0;
-            too_low   <= 1'b0;
-            too_high  <= 1'b0;
+            turn    <= '0;
+            reports <= '0;
         end
     end
 
-    // report a fault at the second bad sample within 16
-    wire [4:0] bad = {|comparator_mismatch, off_circle, |clipped, too_high, too_low};
-    wire [4:0] fresh = {sampled, judged, sampled, sized, sized};
-    wire [4:0] repeated;
-    for (genvar n = 0; n < 5; n++) begin : g_twice
-        // samples for which the last bad one still counts
-        logic [4:0] left;
-        logic       fault;
-        assign repeated[n] = fault;
-        always_ff @(posedge clk) begin
-            if (fresh[n]) begin
-                if (bad[n]) left <= 5'd16;
-                else if (left != '0) left <= left - 1'b1;
-                fault <= bad[n] ? left != '0 : fault && left > 5'd1;
-            end
-            if (rst) begin
-                left  <= '0;
-                fault <= 1'b0;
-            end
-        end
-    end
-
-    logic [7:0] direct;  // bits 4, 5, 6, 8, 9; 10, 11, 12
-    logic [1:0] external;
+    // all results of a sample
+    logic [4:0] of_channels;  // bits 4, 5, 6, 8, 9
+    wire [4:0] twice = {  // bits 7, 3, 1, 0, 2
+        reports[1][5], reports[4][5], reports[3][5], reports[2][5], reports[0][5]
+    };
     always_ff @(posedge clk) begin
-        if (stepped[3]) direct[0] <= jumped;
         if (sampled)
-            direct[4:1] <= {|channel_missing, |comparator_stuck, |no_noise, |channel_stuck};
-        if (judged) direct[7:5] <= {not_in_quadrature, unbalanced, offset_drift};
-        external <= {lost_count, phase_jump};
+            of_channels <= {channel_missing, comparator_stuck, no_noise, channel_stuck, jumped};
+        if (judged) begin
+            amplitude <= length;
+            faults[3:0] <= {twice[3], twice[0], twice[2:1]};
+            faults[7:4] <= {twice[4], of_channels[2:0]};
+            faults[9:8] <= of_channels[4:3];
+            faults[12:10] <= {not_in_quadrature, unbalanced, offset_drift};
+        end
+        faults[14:13] <= {lost_count, phase_jump};
         if (first == '0 || clear) first <= faults;
         if (rst) begin
-            direct  <= '0;
-            external <= '0;
-            first   <= '0;
+            of_channels <= '0;
+            amplitude   <= '0;
+            faults      <= '0;
+            first       <= '0;
         end
     end
-
-    assign faults = {external, direct[7:5], direct[4:3], repeated[4], direct[2:0], repeated[3:0]};
-    // standing[2] is bit 2, standing[3] bit 3; direct[2:0] bits 4, 5, 6; standing[4] bit 7;
-    // direct[4:3] bits 8, 9
 endmodule
 
 `default_nettype wire

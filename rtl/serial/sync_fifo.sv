@@ -10,8 +10,12 @@
 `default_nettype none
 
 module sync_fifo #(
-    parameter int W     = 11,  // bits of a word
-    parameter int DEPTH = 64   // words, a power of two from 4 up
+    parameter int W     = 11,     // bits of a word
+    parameter int DEPTH = 64,     // words, a power of two from 4 up
+    // an attribute uses it:
+    // verilator lint_off UNUSEDPARAM
+    parameter     STYLE = "auto"  // ram_style of the memory: "distributed" takes LUT RAM
+    // verilator lint_on UNUSEDPARAM
 ) (
     input  wire                    clk,
     input  wire                    rst,
@@ -30,7 +34,7 @@ module sync_fifo #(
     end
 
     // a row that is read while it is written is not shown
-    (* no_rw_check *) logic [W-1:0] memory[0:DEPTH-1];
+    (* no_rw_check, ram_style = STYLE *) logic [W-1:0] memory[0:DEPTH-1];
     // counts of words; one bit more than an address distinguishes full from empty
     logic [A:0] written, read;
 

@@ -77,7 +77,7 @@ FIGURES = {
         arctan_ecp5_mhz,
         "MHz",
         "highest clock of the pipelined arctan alone (W 12, STEPS 1, in no product; the node has "
-        "W 16, STEPS 2), one sample per cycle, LFE5U-25F-6, placement seed 1",
+        "arctan_quotient), one sample per cycle, LFE5U-25F-6, placement seed 1",
         ">= 190",
         ELABORATED,
         1,

@@ -37,7 +37,8 @@ module counter_box_bench #(
         .HAS_DRIVE        (0),
         .HAS_SERIAL_CORE  (1),
         .MEMORY_BYTES     (65536),
-        .REGISTER_STYLE   ("huge")
+        .REGISTER_STYLE   ("huge"),
+        .QUEUE_STYLE      ("auto")
     ) u_node (
         .clk,
         .rst,

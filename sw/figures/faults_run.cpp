@@ -7,7 +7,7 @@
 // Input is a row of blocks. Each begins with its number of samples (32 bits); then come the samples
 // of the first lane, of the second, and so on, four bytes each: sin, cos, a, b. The answer to a
 // block holds 16 bits per sample in the same order: the faults 0 to 12 that the sample leads to.
-// Every bit of them is taken as many cycles after its sample as the header of the module states.
+// They are taken as many cycles after the sample as the header of the module states.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -19,8 +19,9 @@
 
 namespace {
 
-constexpr int LATENCY[] = {10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14};  // cycles, by bit
-constexpr int FAULTS = sizeof LATENCY / sizeof *LATENCY, LATEST = 14, SETTINGS = 12;
+// cycles from a sample to its faults, and to the next sample that the module sees, for W = 8
+constexpr int LATENCY = 32, PERIOD = 21, SETTINGS = 12;
+constexpr uint16_t JUDGED = (1u << 13) - 1;  // the faults that the samples lead to
 
 struct Sample {
     int8_t sin, cos;
@@ -32,21 +33,20 @@ void clock(Vtop& top) {
     top.clk = 0, top.eval();
 }
 
-// A block of one lane, a sample per cycle; then nothing comes in until the last sample is judged.
+// A block of one lane; then nothing comes in until the last sample is judged.
 void run_block(Vtop& top, const Sample* samples, uint16_t* found, int count) {
-    for (int n = 0; n < count; n++) found[n] = 0;
-    for (int cycle = 0; cycle < count + LATEST; cycle++) {
-        top.valid = cycle < count;
+    const int cycles = (count - 1) * PERIOD + LATENCY;
+    for (int cycle = 0; cycle < cycles; cycle++) {
+        const int n = cycle / PERIOD;
+        top.valid = cycle % PERIOD == 0 && n < count;
         if (top.valid) {
-            const Sample& sample = samples[cycle];
+            const Sample& sample = samples[n];
             top.sin = uint8_t(sample.sin), top.cos = uint8_t(sample.cos);
             top.a = sample.a, top.b = sample.b;
         }
         clock(top);
-        for (int bit = 0; bit < FAULTS; bit++) {
-            const int n = cycle + 1 - LATENCY[bit];
-            if (n >= 0 && n < count) found[n] |= top.faults & 1u << bit;
-        }
+        const int since = cycle + 1 - LATENCY;
+        if (since >= 0 && since % PERIOD == 0) found[since / PERIOD] = top.faults & JUDGED;
     }
 }
 

@@ -19,13 +19,14 @@ class EngineBus:
 
     def reset(self):
         self.setting = None  # (axis, number, filter, value) that is being given
-        self.pushes, self.filter_at, self.axis = False, 0, 0
+        self.scaled, self.left = None, 0  # the one that is being shifted, for how many cycles
+        self.pushes, self.filter_at, self.axis, self.of_gain = False, 0, 0, False
         self.gains = self.push = 0  # bits of axes
         self.shift_by = None
 
     def waits(self, ready=1, setting_waits=0, pending=0, moves=0, moved=0):
         """(hold, waits)"""
-        hold = bool(self.setting) or setting_waits or self.pushes or not ready
+        hold = bool(self.scaled or self.setting) or setting_waits or self.pushes or not ready
         return int(hold), int(hold or self.push | pending | moves | moved > 0)
 
     def word_of(self, address):
@@ -60,22 +61,33 @@ class EngineBus:
         for n in range(self.axes):
             if moved >> n & 1:
                 self.shift_by = moved_by[n]
-        done = not self.setting and not setting_waits
+        done = not self.scaled and not self.setting and not setting_waits
         self.push = int(done and self.pushes) << self.axis
         self.pushes = self.pushes and not done
         self.gains, self.setting = 0, None
+        self.shift()
         axis, word = self.word_of(address)
         filter_at = self.filter_at
         if stores and word and axis < self.axes and word.name == "filter_address":
             self.filter_at = value & 31
         if not stores or not word or word.name == "filter_address" or axis >= self.axes:
             return
-        number = word.number
+        number = word.at ^ 0x10
         if word.name == "filter_value":
             if filter_at >> 3 >= self.filters:
                 return
             number = 0x50 + (filter_at & 7)
         self.axis = axis
-        self.setting = axis, number, filter_at >> 3, self.value_of(word, value, value_low)
+        self.scaled = axis, number, filter_at >> 3, self.value_of(word, value, value_low)
+        self.left = word.places
         self.pushes = word.name == "segment_ticks"
-        self.gains = int(word.name in ("kp", "kd", "kv", "ka")) << axis
+        self.of_gain = word.name in ("kp", "kd", "kv", "ka")
+        if word.wide:
+            self.shift()
+
+    def shift(self):
+        """What happens to the setting in a cycle."""
+        if self.scaled and self.left <= 1:
+            self.setting, self.scaled = self.scaled, None
+            self.gains = int(self.of_gain) << self.axis
+        self.left -= 1

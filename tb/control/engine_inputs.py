@@ -55,7 +55,7 @@ class EngineInputs:
         self.lost_live = 0 if tick else self.lost_live | powerless
         self.lost_off_live = 0 if tick else self.lost_off_live | off
         if stepped:
-            self.last = elapsed, downward
+            self.last = 0 if tick else elapsed, downward
         if rst:
             self.reset()
         both = self.live | self.seen

@@ -15,29 +15,36 @@ class EngineSequencer:
         self.reset()
 
     def reset(self):
-        self.line = self.axis = self.ticking = self.busy = self.overrun = 0
-        self.actions = [0, 0]  # of the line whose operand is there, of the line that is executed
+        self.next = self.target = 0  # the lines that may be fetched
+        self.condition = self.unless = 0  # of the line before
+        self.axis = self.ticking = self.busy = self.overrun = 0
+        self.read_action = self.action = 0
 
-    def clk(self, rst=0, tick=0, conditions=0):
-        """conditions: the levels as the input of that name."""
-        code, action = self.codes[self.line], self.actions[1]
-        number = code >> 19 & 63
+    def line(self, conditions):
+        """The number of the line that is fetched with these conditions."""
         own = {
             "never": 0,
             "ticking": self.ticking,
-            "loop": self.count != 1,
+            "loop": int(self.count != 1),
             "due": self.busy,
             "wrapped": int(self.axis == 0),
         }
         level = {CONDITIONS[name]: value for name, value in own.items()}.get(
-            number, conditions >> number & 1
+            self.condition, conditions >> self.condition & 1
         )
-        jumps = level != code >> 25 & 1
-        acts = number == 0 and not code >> 25 & 1
-        self.actions = [code >> 26 & 255 if acts else 0, self.actions[0]]
-        self.line = code >> 26 if jumps else (self.line + 1) % LINES
-        if number == CONDITIONS["loop"] and self.count is not None:
+        return self.target if level != self.unless else self.next
+
+    def clk(self, rst=0, tick=0, conditions=0):
+        """conditions: the levels as the input of that name."""
+        line, action = self.line(conditions), self.action
+        code = self.codes[line]
+        acts = self.condition == 0 and not self.unless
+        self.action = self.read_action if acts else 0
+        self.read_action = code >> 26 & 255
+        self.next, self.target = (line + 1) % LINES, code >> 26
+        if self.condition == CONDITIONS["loop"] and self.count is not None:
             self.count = (self.count - 1) % 32
+        self.condition, self.unless = code >> 19 & 63, code >> 25 & 1
         if action >> 5 == 5:
             self.count = action & 31
         finishes = action == ACTIONS["finished"]
@@ -50,4 +57,4 @@ class EngineSequencer:
             self.axis = (self.axis + 1) % self.axes
         if rst:
             self.reset()
-        return self.codes[self.line], self.actions[1], self.axis, self.busy, self.overrun
+        return self.codes[self.line(conditions)], self.action, self.axis, self.busy, self.overrun

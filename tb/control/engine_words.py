@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/control/engine_words.sv: facts(kind, word) are all its outputs."""
 
-from tables.engine_words import FILTER_ADDRESS, FILTER_VALUE, GAINS, PUSH, SHIFTS, words
+from tables.engine_words import FILTER_ADDRESS, FILTER_VALUE, GAINS, PUSH, words
 
 FOUND = {(w.kind, w.at): w for w in words()}
 
@@ -10,11 +10,10 @@ def facts(kind, word):
     w = FOUND.get((kind, word))
     name = w.name if w else ""
     return dict(
-        number=w.number if w else 0,
-        scale=SHIFTS.index(w.shift) if w else 0,
+        places=w.places if w else 16,
         of_engine=int(bool(w) and name != FILTER_ADDRESS),
         wide=int(bool(w) and w.wide),
-        has_sign=int(bool(w) and w.signed),
+        has_sign=int(bool(w) and w.signed and not w.wide),
         gain=int(name in GAINS),
         push=int(name == PUSH),
         filter_address=int(name == FILTER_ADDRESS),

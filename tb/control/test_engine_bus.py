@@ -17,6 +17,7 @@ from tb.control.engine_words import FOUND
 from tb.registers.register_layout import RegisterLayout
 
 IDLE = dict(stores=0, address=0, value=0, value_low=0, setting_waits=0, pending=0, moves=0, moved=0)
+MOST = 17  # cycles from stores to setting_write
 LEVELS = ("setting_waits", "pending", "moves", "moved")
 
 
@@ -72,12 +73,26 @@ class Bus:
         if value_low or register in ("segment_velocity", "step_ratio"):
             address += 1
         await self.clk(stores=1, address=address, value=value, value_low=value_low)
-        found = self.setting() if int(self.dut.setting_write.value) else None
-        return found and (found[1], found[3])
+        for self.latency in range(1, MOST + 1):
+            if self.latency > 1:
+                await self.clk()
+            if int(self.dut.setting_write.value):
+                found = self.setting()
+                await self.clk()
+                return found[1], found[3]
+        return None
 
 
 @cocotb.test()
-async def latency_is_1_and_settings_have_the_units_of_the_engine(dut):
+async def latency_is_17_at_most_and_1_for_a_value_of_64_bits(dut):
+    bus = await Bus(dut).reset()
+    for register, latency in (("kp", 17), ("integral_limit", 5), ("step_ratio", 1)):
+        await bus.write("actuator" if register == "step_ratio" else "axis", register, 1)
+        assert bus.latency == latency
+
+
+@cocotb.test()
+async def settings_have_the_units_of_the_engine(dut):
     bus = await Bus(dut).reset()
     for block, register, value, name, expected in (
         ("axis", "kp", 77, "kp", 77),
@@ -122,7 +137,9 @@ async def an_axis_that_is_not_built_is_left_out(dut):
 @cocotb.test()
 async def a_segment_is_pushed_when_its_last_word_is_written(dut):
     bus = await Bus(dut).reset()
-    await bus.write("axis", "segment_ticks", 5)
+    await bus.clk(stores=1, address=address_of("axis", "segment_ticks"), value=5)
+    while not int(dut.setting_write.value):
+        assert await bus.clk() == (1, 1) and not int(dut.push.value)
     assert await bus.clk() == (1, 1) and not int(dut.push.value)
     for _ in range(4):
         assert await bus.clk(setting_waits=1) == (1, 1) and not int(dut.push.value)
@@ -147,9 +164,10 @@ async def random_words_match_the_model(dut):
     known = [4 + 8 * kind + axis << 6 | word for kind, word in FOUND for axis in range(bus.axes)]
     layout = RegisterLayout(bus.axes)  # values are as the register memory stores them
     left = 0  # cycles for which the last setting waits
-    for _ in range(6000):
+    for _ in range(20_000):
         stores = 0
-        if not left and bus.model.setting is None and not bus.model.pushes:
+        model = bus.model
+        if not left and not (model.scaled or model.setting or model.pushes):
             stores = int(random.random() < 0.6)
         address = random.choice((random.choice(known), random.getrandbits(14)))
         value = random.choice((random.getrandbits(32), random.getrandbits(17), 65536))

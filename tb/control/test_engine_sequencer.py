@@ -36,7 +36,7 @@ class Sequencer:
             int(dut.busy.value),
             int(dut.overrun.value),
         )
-        assert got == want, f"line {self.model.line}: {got}, the model has {want}"
+        assert got == want, f"line {self.model.line(conditions)}: {got}, the model has {want}"
         return got
 
 

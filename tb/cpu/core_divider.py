@@ -39,10 +39,10 @@ class CoreDivider:
         ready = int(self.busy and self.left == 0)
         if not self.busy:
             self.busy = int(valid and is_division(instruction) and not self.ready)
-            self.left, self.remainder = self.w, 0
+            self.left = self.w
             self.quotient = self.amount(a, instruction)
         elif self.left == 0:
-            self.busy = 0
+            self.busy = self.remainder = 0
         else:
             wide, divisor = (
                 self.remainder << 1 | self.quotient >> (self.w - 1),
@@ -54,5 +54,5 @@ class CoreDivider:
             self.left -= 1
         self.ready = 0 if rst else ready
         if rst:
-            self.busy = 0
+            self.busy = self.remainder = 0
         return self.ready, self.result

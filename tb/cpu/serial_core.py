@@ -3,7 +3,7 @@
 in which the program writes them.
 """
 
-from tb.cpu.soft_core import MASK, signed
+from tb.cpu.core_program import MASK, memory_results, signed
 
 
 def results(a, b):
@@ -15,8 +15,5 @@ def results(a, b):
         0x12345000,
         a + 1,
     ]
-    memory = a.to_bytes(4, "little") + b.to_bytes(4, "little")
-    halves = [int.from_bytes(memory[k : k + 2], "little") for k in range(0, 8, 2)]
-    out += [*memory, *(signed(x, 8) for x in memory), *halves, *(signed(x, 16) for x in halves)]
-    out += [b, a, b & ~0xFF0000 | 0x5A0000, a & 0xFFFF | 0xA55A0000]
+    out += memory_results(a, b)
     return [int(x) & MASK for x in out]

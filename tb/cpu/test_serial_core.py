@@ -5,63 +5,37 @@ tb/cpu/serial_core.py.
 """
 
 import random
-import subprocess
-from pathlib import Path
 
 import cocotb
-from cocotb.triggers import FallingEdge, RisingEdge
 
-from firmware import build as firmware_build
 from tb.bench import ROOT, run, start
+from tb.cpu import core_program
 from tb.cpu.serial_core import results
 from tb.cpu.test_flash_loader import Flash
 
 BYTES = 4096  # of the memory
 PROGRAM = 2048  # bytes that are copied
 START = 131072
-BUILD = ROOT / "build" / "serial_core"
-OPERANDS = [0, 1, 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF]
+FLASH = ROOT / "build" / "serial_core" / "program.bin"
 TRAPS = range(1, 9)  # ORDER in serial_test.c
-ROUND = len(results(0, 0))  # results of one round of the program
 BOOT = 64 * (64 + PROGRAM // 4 + 2)  # cycles until the core starts
 
 
-class Registers:
-    """The other side of the register bus, which answers two cycles after select, and the flash."""
+class Registers(core_program.Registers):
+    """With the flash."""
 
     def __init__(self, dut):
-        self.dut, self.words, self.written, self.strobes = dut, {0: 0, 4: 0, 8: 0}, [], []
-        self.answer = None  # to the access of the cycle before
-        self.flash = Flash((BUILD / "program.bin").read_bytes() + bytes(1), START)
+        super().__init__(dut)
+        self.flash = Flash(FLASH.read_bytes() + bytes(1), START)
 
     async def clk(self, rst=0):
-        """Advance one cycle; what the bus shows before its clock edge counts."""
-        dut = self.dut
-        dut.rst.value = rst
-        strobe = not rst and str(dut.select.value) == "1"
-        self.strobes.append(strobe)
-        if strobe:
-            address = int(dut.address.value)
-            if int(dut.write.value):
-                self.written.append((address, int(dut.wdata.value)))
-        read = strobe and not int(dut.write.value)
-        await RisingEdge(dut.clk)
-        dut.rdata.value = random.getrandbits(32) if self.answer is None else self.answer
-        self.answer = self.words.get(address, 0) if read else None
-        await FallingEdge(dut.clk)
+        trap, dut = await super().clk(rst), self.dut
         pins = (dut.flash_cs_n, dut.flash_sclk, dut.flash_mosi)
         dut.flash_miso.value = self.flash.step(*(int(pin.value) for pin in pins))
-        return str(dut.trap.value) == "1"
+        return trap
 
     async def until(self, done, clks=30000):
-        for n in range(clks):
-            if done():
-                return n
-            await self.clk()
-        raise AssertionError(f"the program did not get that far in {clks} cycles")
-
-    def taken(self, address):
-        return [value for where, value in self.written if where == address]
+        return await super().until(done, clks)
 
 
 async def begin(dut, whole=False):
@@ -89,15 +63,7 @@ async def every_instruction_and_access_width_has_the_right_result(dut):
     pairs += [
         (random.getrandbits(32), random.getrandbits(random.choice([5, 32]))) for _ in range(4)
     ]
-    for a, b in pairs:  # each pair is set just after the last result of the pair before
-        registers.written.clear()
-        registers.words[0], registers.words[4] = a, b
-        await registers.until(lambda: len(registers.taken(0xFFFC)) >= ROUND)
-        got, want = registers.taken(0xFFFC), results(a, b)
-        assert got == want, (
-            f"operands {a:#x}, {b:#x}: results "
-            f"{[n for n, (g, w) in enumerate(zip(got, want)) if g != w]} are wrong"
-        )
+    await core_program.results_are_right(registers, pairs, results, 30000)
     strobes = registers.strobes
     assert not any(a and b for a, b in zip(strobes, strobes[1:])), "an access is one strobe"
 
@@ -153,30 +119,7 @@ async def a_register_access_waits_until_the_registers_are_ready(dut):
     assert not int(dut.trap.value)
 
 
-def compile_program():
-    """Compile the program with the firmware's own tools to the bytes of the flash."""
-    here, (command, libraries) = Path(__file__).parent, firmware_build.compiler("serial")
-    BUILD.mkdir(parents=True, exist_ok=True)
-    elf = BUILD / "program.elf"
-    subprocess.run(
-        [
-            *command,
-            *firmware_build.FLAGS,
-            firmware_build.FAST,
-            f"-DMEMORY_BYTES={BYTES}",
-            f"-Wl,-T,{here / 'core_test.ld'}",
-            "-o",
-            str(elf),
-            str(here / "serial_test.c"),
-            *libraries,
-        ],
-        check=True,
-        timeout=300,
-    )
-    content, _ = firmware_build.contents(firmware_build.read_elf(elf)[0], PROGRAM)
-    (BUILD / "program.bin").write_bytes(content)
-
-
 def test_serial_core():
-    compile_program()
+    content = core_program.content("serial", BYTES, PROGRAM)
+    FLASH.write_bytes(content)
     run("serial_core", __file__, MEMORY_BYTES=BYTES, PROGRAM_BYTES=PROGRAM, FLASH_START=START)

@@ -5,58 +5,26 @@ register bus, then makes every wrong access. Its results must be those of tb/cpu
 
 import random
 import struct
-import subprocess
-from pathlib import Path
 
 import cocotb
-from cocotb.triggers import FallingEdge, RisingEdge
 
-from firmware import build as firmware_build
 from tb.bench import ROOT, rtl_only, run, start
+from tb.cpu import core_program
 from tb.cpu.soft_core import results
 
 BYTES = 2048
-BUILD = ROOT / "build" / "soft_core"
 OPERANDS = [0, 1, 2, 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF, 0x0000FFFF, 31]
-TRAPS = range(1, 14)  # ORDER in core_test.c
+TRAPS = range(1, 14)  # ORDER in soft_test.c
 ROUND = len(results(0, 0))  # results of one round of the program
 
 
-class Registers:
-    """The other side of the register bus: answers two cycles after select, and keeps what was
-    written.
-    """
-
-    def __init__(self, dut):
-        self.dut, self.words, self.written, self.selects = dut, {0: 0, 4: 0, 8: 0}, [], 0
-        self.answer = None  # to the access of the cycle before
-
-    async def clk(self, rst=0):
-        """Advance one cycle; what the bus shows before its clock edge counts."""
-        dut = self.dut
-        dut.rst.value = rst
-        strobe = not rst and str(dut.select.value) == "1"
-        if strobe:
-            self.selects += 1
-            address = int(dut.address.value)
-            if int(dut.write.value):
-                self.written.append((address, int(dut.wdata.value)))
-        read = strobe and not int(dut.write.value)
-        await RisingEdge(dut.clk)
-        dut.rdata.value = random.getrandbits(32) if self.answer is None else self.answer
-        self.answer = self.words.get(address, 0) if read else None
-        await FallingEdge(dut.clk)
-        return int(dut.trap.value)
+class Registers(core_program.Registers):
+    @property
+    def selects(self):
+        return sum(self.strobes)
 
     async def until(self, done, clks=5000):
-        for n in range(clks):
-            if done():
-                return n
-            await self.clk()
-        raise AssertionError(f"the program did not get that far in {clks} cycles")
-
-    def taken(self, address):
-        return [value for where, value in self.written if where == address]
+        return await super().until(done, clks)
 
 
 async def begin(dut):
@@ -77,16 +45,8 @@ async def every_instruction_and_access_width_has_the_right_result(dut):
     pairs += [
         (random.getrandbits(32), random.getrandbits(random.choice([5, 16, 32]))) for _ in range(8)
     ]
-    for a, b in pairs:  # each pair is set just after the last result of the pair before
-        registers.written.clear()
-        registers.words[0], registers.words[4] = a, b
-        await registers.until(lambda: len(registers.taken(0xFFFC)) >= ROUND)
-        got, want = registers.taken(0xFFFC), results(a, b)
-        assert got == want, (
-            f"operands {a:#x}, {b:#x}: results "
-            f"{[n for n, (g, w) in enumerate(zip(got, want)) if g != w]} are wrong"
-        )
-        assert not int(dut.trap.value)
+    await core_program.results_are_right(registers, pairs, results, 5000)
+    assert not int(dut.trap.value)
 
 
 @cocotb.test()
@@ -225,32 +185,8 @@ async def a_register_access_waits_until_the_registers_are_ready(dut):
     assert not int(dut.trap.value)
 
 
-def compiled():
-    """Compile the program with the firmware's own tools to a file for $readmemh, as long as the
-    whole memory.
-    """
-    here, command, libraries = Path(__file__).parent, *firmware_build.compiler()
-    BUILD.mkdir(parents=True, exist_ok=True)
-    elf, words = BUILD / "program.elf", BUILD / "program.hex"
-    subprocess.run(
-        [
-            *command,
-            *firmware_build.FLAGS,
-            firmware_build.FAST,
-            f"-DMEMORY_BYTES={BYTES}",
-            f"-Wl,-T,{here / 'core_test.ld'}",
-            "-o",
-            str(elf),
-            str(here / "core_test.c"),
-            *libraries,
-        ],
-        check=True,
-        timeout=300,
-    )
-    content, _ = firmware_build.contents(firmware_build.read_elf(elf)[0], BYTES)
-    words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
-    return words
-
-
 def test_soft_core():
-    run("soft_core", __file__, MEMORY_BYTES=BYTES, FIRMWARE=str(compiled()))
+    words = ROOT / "build" / "soft_core" / "program.hex"
+    content = core_program.content("soft", BYTES, BYTES)
+    words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
+    run("soft_core", __file__, MEMORY_BYTES=BYTES, FIRMWARE=str(words))

@@ -27,4 +27,4 @@ class FineStage:
             open_command=closer if enable else 0,
             **strobes,
         )
-        return valid, self.command, int(hold and abs(self.command) == limit)
+        return valid, self.command, int(hold and self.loop.at_limit)

@@ -11,7 +11,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.drive.fine_stage import RETURN, FineStage
 
-LATENCY = 53  # cycles from tick to command
+LATENCY = 101  # cycles from tick to command
 INPUTS = dict(enable=1, hold=1, kp=1 << 16, ki=0, limit=1000, target=0, position=0)
 
 
@@ -49,7 +49,7 @@ class Stage:
 
 
 @cocotb.test()
-async def latency_is_53(dut):
+async def latency_is_101(dut):
     stage = await Stage(dut).reset()
     await stage.tick()
     valid, cycles = (await stage.clk(tick=1))[0], 1

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """pi_loop: both terms by hand, anti-windup, bumpless transfer when loop, power or gains change,
-both ends of the ranges, and random ticks against the model in every cycle.
+both ends of the ranges, and random ticks, with changes within them, against the model in every
+cycle.
 """
 
 import random
@@ -9,7 +10,7 @@ import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from tb.bench import run, start
-from tb.drive.pi_loop import LATENCY, PiLoop
+from tb.drive.pi_loop import LATENCY, RETAKING, PiLoop
 
 INPUTS = "power closed_loop kp ki limit target position open_command".split()
 ONE = 1 << 16  # of kp
@@ -43,6 +44,7 @@ class Loop:
         want = self.model.clk(**strobes, **self.inputs)
         got = int(self.dut.valid.value), self.dut.command.value.to_signed()
         assert got == want, f"valid, command are {got}, the model has {want}"
+        assert int(self.dut.at_limit.value) == self.model.at_limit
         return got
 
     async def tick(self, **inputs):
@@ -65,13 +67,13 @@ class Loop:
 
 
 @cocotb.test()
-async def latency_is_53_and_a_tick_within_the_calculation_is_ignored(dut):
+async def latency_is_101_and_a_tick_within_the_calculation_is_ignored(dut):
     loop = await Loop(dut).reset(kp=ONE, target=9)
     await loop.tick()
     out, cycles = await loop.clk(tick=1), 1
     while not out[0]:
         out, cycles = await loop.clk(tick=1), cycles + 1
-    assert cycles == LATENCY + 1 == 53 and out[1] == 9
+    assert cycles == LATENCY + 1 == 101 and out[1] == 9
 
 
 @cocotb.test()
@@ -186,6 +188,59 @@ async def random_ticks_and_a_reset_in_mid_flow_match_the_model(dut):
             for _ in range(random.randrange(LATENCY)):
                 await loop.clk()
             await loop.clk(rst=1)
+
+
+@cocotb.test()
+async def a_change_of_any_input_within_a_calculation_matches_the_model(dut):
+    loop = await Loop(dut).reset()
+    for _ in range(100):
+        loop.set(target=random.randrange(-5000, 5000), power=1, closed_loop=1)
+        out = await loop.clk(tick=1)
+        while not out[0]:
+            strobes = {}
+            if random.random() < 0.02:
+                name, value = random.choice(
+                    (
+                        ("power", random.getrandbits(1)),
+                        ("closed_loop", random.getrandbits(1)),
+                        ("kp", random.getrandbits(20)),
+                        ("ki", random.getrandbits(20) * random.getrandbits(1)),
+                        ("limit", random.getrandbits(random.randrange(1, 16))),
+                        ("open_command", random.getrandbits(16) - (1 << 15)),
+                        ("position", random.randrange(-5000, 5000)),
+                    )
+                )
+                loop.set(**{name: value})
+                strobes = dict(gains_changed=int(name == "kp"))
+            out = await loop.clk(**strobes, tick=int(random.random() < 0.05))
+
+
+@cocotb.test()
+async def the_limit_that_was_sampled_with_the_tick_holds_for_its_command(dut):
+    loop = await Loop(dut).reset(kp=ONE, target=1000, limit=500)
+    for wait in (0, 1, 40, 90):
+        assert await loop.tick(limit=500) == 500
+        await loop.clk(tick=1)
+        for _ in range(wait):
+            await loop.clk()
+        loop.set(limit=200)
+        out = await loop.clk()
+        while not out[0]:
+            out = await loop.clk()
+        assert out[1] == 500 and await loop.tick() == 200
+
+
+@cocotb.test()
+async def latency_is_24_more_when_the_integral_is_retaken(dut):
+    loop = await Loop(dut).reset(kp=ONE, ki=1 << 20, target=9)
+    await loop.tick()
+    await loop.gains(kp=2 * ONE)
+    for want in (LATENCY + RETAKING, LATENCY):
+        out, cycles = await loop.clk(tick=1), 0
+        while not out[0]:
+            out, cycles = await loop.clk(), cycles + 1
+        assert cycles == want
+    assert LATENCY + 1 + RETAKING == 125
 
 
 def test_pi_loop():

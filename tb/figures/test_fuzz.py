@@ -57,7 +57,7 @@ needs_gcc = pytest.mark.skipif(
 @needs_gcc
 @pytest.mark.parametrize("image", images())
 def test_the_firmware_survives_a_short_run(image):
-    outcome = fuzz_firmware(5, image)
+    outcome = fuzz_firmware(2, image)
     assert outcome.crash is None and outcome.runs > 500
 
 

@@ -104,6 +104,7 @@ STAND_ALONE = {  # instantiated by no other module, and the reason why they exis
     "node": "a product",
     "relay": "a product",
     "encoder_counter": "a product: a counter on the bus of another design",
+    "arctan_pipelined": "the arctan without multipliers; narrow samples are correctly rounded",
     "arctan_iterative": "the small alternative to arctan_pipelined",
     "arctan_table": "the method of S0",
     "count_outlier_filter": "the method of S0",

@@ -3,24 +3,29 @@
 
 
 class CalibrationRecorder:
-    """step() returns (word, full, invalid) after the cycle; word is None until that address has
-    been written.
+    """step() returns (word, full, invalid) after the cycle; word is None while what was read has
+    not been written.
     """
 
     def __init__(self, w=8, depth=1024):
-        self.w, self.depth, self.burst = w, depth, [None] * depth
+        self.w, self.depth, self.burst, self.word = w, depth, [None] * depth, None
         self.begin()
 
     def begin(self, recording=False):
-        self.recording, self.full, self.invalid, self.kept, self.next, self.left, self.earlier = (
-            recording,
-            0,
-            0,
-            0,
-            0,
-            0,
-            None,
-        )
+        self.recording, self.full, self.invalid = recording, 0, 0
+        self.place = self.left = 0
+        self.earlier = None
+
+    def value(self, phases, sin, cos, phase):
+        """The word that this sample or phase completes; None for the earlier of two phases."""
+        if not phases:
+            high, low = (channel << 16 - self.w & 0xFFFF for channel in (cos, sin))
+        elif self.earlier is None:
+            self.earlier = phase
+            return None
+        else:
+            high, low, self.earlier = phase, self.earlier, None
+        return high << 16 | low
 
     def step(
         self,
@@ -36,28 +41,23 @@ class CalibrationRecorder:
         read=0,
         rst=0,
     ):
-        word, was_full = self.burst[self.next], self.full
+        was_full, value = self.full, None
         if self.recording:
             self.invalid |= disturbed
             if phase_valid if phases else sampled:
                 if self.left:
                     self.left -= 1
                 else:
-                    shift, self.left = 16 - self.w, max(decimation, 1) - 1
-                    if phases and self.earlier is None:
-                        self.earlier = phase
-                    else:
-                        high, low = (
-                            (phase, self.earlier)
-                            if phases
-                            else (cos << shift & 0xFFFF, sin << shift & 0xFFFF)
-                        )
-                        self.burst[self.kept] = high << 16 | low
-                        self.kept, self.earlier = self.kept + 1, None
-                    if self.kept == self.depth:
-                        self.recording, self.full, self.kept = False, 1, 0
-        if was_full and read:
-            self.next = (self.next + 1) % self.depth
+                    self.left = max(decimation, 1) - 1
+                    value = self.value(phases, sin, cos, phase)
+        if value is None:
+            self.word = self.burst[self.place]
+        else:
+            self.burst[self.place] = value
+            if self.place == self.depth - 1:
+                self.recording, self.full = False, 1
+        if value is not None or (was_full and read):
+            self.place = (self.place + 1) % self.depth
         if start or rst:
             self.begin(recording=bool(start) and not rst)
-        return word, self.full, self.invalid
+        return self.word, self.full, self.invalid

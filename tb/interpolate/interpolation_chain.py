@@ -6,7 +6,7 @@ advances all axes by one cycle, OwnChain computes the samples of one axis withou
 from collections import deque
 from typing import NamedTuple
 
-from tb.interpolate import arctan_pipelined, harmonic_correction, signal_correction
+from tb.interpolate import arctan_quotient, harmonic_correction, signal_correction
 from tb.interpolate.correction_settings import CorrectionSettings
 from tb.interpolate.fringe_tracker import FringeTracker
 from tb.interpolate.harmonic_correction import HarmonicCorrection
@@ -14,8 +14,6 @@ from tb.interpolate.sample_arbiter import SampleArbiter
 from tb.interpolate.signal_correction import Settings, SignalCorrection
 from tb.position.count_phase_check import CountPhaseCheck
 from tb.sense.outlier_filter import OutlierFilter
-
-STEPS = 2  # of the arctan from register to register
 
 
 class Outputs(NamedTuple):
@@ -38,8 +36,9 @@ class OneAxis:
 
 
 class InterpolationChain:
-    def __init__(self, axes, w, has_harmonics=1):
+    def __init__(self, axes, w, has_harmonics=1, sample_cycles=1):
         self.axes, self.w, self.has_harmonics = axes, w, has_harmonics
+        self.sample_cycles = sample_cycles if axes == 1 else 1
         self.tables = HarmonicCorrection(axes)
         self.reset()
 
@@ -50,14 +49,14 @@ class InterpolationChain:
         self.limits = [0] * self.axes
         self.outliers = [OutlierFilter() for _ in range(self.axes)]
         self.correction = SignalCorrection(self.w, self.axes)
-        self.arctan = arctan_pipelined.ArctanPipelined(16, STEPS)
+        self.arctan = arctan_quotient.ArctanQuotient(self.sample_cycles)
         self.tables.reset()
         self.trackers = [FringeTracker() for _ in range(self.axes)]
         self.check = CountPhaseCheck(self.axes)
         # what the blocks gave in the last cycle
         self.served = self.sampled = self.corrected = self.plain = self.straight = self.done = None
         self.loaded, self.overruns = None, set()
-        behind = arctan_pipelined.latency(16, STEPS) + signal_correction.LATENCY
+        behind = arctan_quotient.LATENCY + signal_correction.LATENCY
         self.axes_of_plain = deque([None] * (behind - 1))
         self.axes_of_straight = deque([None] * (harmonic_correction.LATENCY - 1))
 
@@ -83,7 +82,7 @@ class InterpolationChain:
         self.axes_of_plain.append(n if self.sampled else None)
         loaded = self.settings.step(axis, words.get("correction"), words.get("load", 0))
 
-        found, phase, _ = self.arctan.step(self.corrected is not None, *(self.corrected or (0, 0)))
+        found, phase = self.arctan.step(self.corrected is not None, *(self.corrected or (0, 0)))
         n = self.axes_of_plain.popleft()
         plain = (n, phase) if found else None
 
@@ -137,7 +136,7 @@ class OwnChain:
         """(step, phase, overspeed) of a sample."""
         sin, cos, _ = self.outliers.sample(sin, cos, *self.outlier)
         sin, cos = signal_correction.corrected(sin, cos, self.settings, self.w)
-        phase, _ = arctan_pipelined.sample(16, sin, cos)
+        phase = arctan_quotient.phase_of(sin, cos)
         if self.table:
             phase = harmonic_correction.corrected(phase, self.table)
         step, overspeed = self.tracker.follow(phase)

@@ -33,7 +33,8 @@ class Bench:
     def __init__(self, dut):
         self.dut, self.axes, self.w = dut, int(dut.AXES.value), int(dut.W.value)
         self.harmonics = int(dut.HAS_HARMONICS.value)
-        self.model = InterpolationChain(self.axes, self.w, self.harmonics)
+        self.apart = int(dut.SAMPLE_CYCLES.value)  # of the samples of an axis
+        self.model = InterpolationChain(self.axes, self.w, self.harmonics, self.apart)
         self.held, self.counts = [(0, 0)] * self.axes, [0] * self.axes
         self.everyone = (1 << self.axes) - 1
 
@@ -181,13 +182,13 @@ async def each_axis_gets_what_a_chain_of_its_own_would_give_at_full_load(dut):
     await bench.cycle()
     speeds = [random.uniform(-0.2, 0.2) for _ in range(axes)]
     want, got = [[] for _ in range(axes)], [[] for _ in range(axes)]
-    for n in range(300):
+    for n in range(300 if bench.apart == axes else 50):
         new = {}
         for axis in range(axes):
             periods = random.random() if random.random() < 0.03 else n * speeds[axis]
             new[axis] = bench.point(periods)
             want[axis].append(own[axis].sample(*new[axis]))
-        for cycle in range(axes):
+        for cycle in range(bench.apart):
             out = await bench.cycle(new if cycle == 0 else None)
             assert not out.overrun
             if out.done:
@@ -281,6 +282,16 @@ async def any_input_matches_the_model_in_every_cycle(dut):
         await bench.cycle(new, random.randrange(axes), words, enable, learn, rst)
 
 
-@pytest.mark.parametrize("axes, w, harmonics", [(1, 8, 1), (4, 8, 1), (8, 16, 1), (3, 12, 0)])
-def test_interpolation_chain(axes, w, harmonics):
-    run("interpolation_chain", __file__, AXES=axes, W=w, HAS_HARMONICS=harmonics)
+@pytest.mark.parametrize(
+    "axes, w, harmonics, cycles",
+    [(1, 8, 1, 1), (1, 8, 1, 29), (4, 8, 1, 4), (8, 16, 1, 8), (3, 12, 0, 3)],
+)
+def test_interpolation_chain(axes, w, harmonics, cycles):
+    run(
+        "interpolation_chain",
+        __file__,
+        AXES=axes,
+        W=w,
+        HAS_HARMONICS=harmonics,
+        SAMPLE_CYCLES=cycles,
+    )

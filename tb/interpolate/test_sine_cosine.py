@@ -14,16 +14,15 @@ import numpy as np
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge
 
+from tables.arctan_quotient import bound as arctan_bound
 from tb.bench import run, seed, start
-from tb.interpolate.arctan_pipelined import arctan_rotation, sample
+from tb.interpolate import arctan_quotient
 from tb.interpolate.fringe_tracker import FringeTracker
 from tb.position.unwrap import Unwrap
 
 PERIOD_NM = 800
 LATENCY = 22  # cycles from an ADC word to its position
-ARCTAN = arctan_rotation.quarter_bound(
-    arctan_rotation.PIPELINED, 16
-)  # LSB of phase; a corrected channel has half of the size of 16 bits
+ARCTAN = arctan_bound()  # LSB of phase
 INPUTS = dict(
     setting=0, setting_written=0, harmonic_enable=0, shift_periods=0, valid=0, sin=0, cos=0
 )
@@ -131,7 +130,7 @@ def phase_of(w, sin, cos):
     """The phase of a word that the correction does not change: both channels leave it at half the
     size.
     """
-    return sample(16, *((channel << 16 - w) + 1 >> 1 for channel in (sin, cos)))[0]
+    return arctan_quotient.phase_of(*((channel << 16 - w) + 1 >> 1 for channel in (sin, cos)))
 
 
 class Chain:

@@ -7,8 +7,8 @@ LATENCY = 3
 
 
 def wrapped(difference):
-    """Wrap to 46 bits with a sign: the count wraps at 2^32 / 4 periods."""
-    return (difference + (1 << 45)) % (1 << 46) - (1 << 45)
+    """Wrap to 32 bits with a sign: 2^16 periods."""
+    return (difference + (1 << 31)) % (1 << 32) - (1 << 31)
 
 
 class CountPhaseCheck:

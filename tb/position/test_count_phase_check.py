@@ -119,6 +119,16 @@ async def the_count_wraps_without_a_disagreement(dut):
 
 
 @cocotb.test()
+async def a_difference_shows_up_to_the_wrap_at_65536_periods(dut):
+    await begin(dut)
+    for count in (1 << 17, (1 << 18) - 3, 3, 1 << 31):
+        await again(dut)
+        await settle(dut, 0, 0)
+        far = count % (1 << 18) != 0
+        assert await settle(dut, 0, count - (count >> 31 << 32)) == far
+
+
+@cocotb.test()
 async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     axes = int(dut.AXES.value)

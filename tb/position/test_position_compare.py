@@ -232,6 +232,27 @@ async def a_shift_leaves_the_points_on_the_scale(dut):
 
 
 @cocotb.test()
+async def start_refers_to_the_origin_in_the_cycle_after_arm(dut):
+    compare = await begin(dut)
+    compare.settings = dict(start=1000, step=1000)
+    await compare.cycle(arm=1, valid=1, position=2000, shift=1, shift_periods=3)
+    await compare.ride([999], 5)
+    assert compare.pulses == 0
+    await compare.ride([1000, 1999], 5)
+    assert compare.pulses == 1
+
+
+@cocotb.test()
+async def armed_falls_one_cycle_after_the_last_point_is_counted(dut):
+    compare = await begin(dut)
+    for settings in (dict(step=10, count=1), dict(step=0, count=0)):
+        await compare.arm(start=10, **settings)
+        await compare.ride([0, 25], 1)
+        assert await compare.cycle() == (1, 1, 0, 1)
+        assert await compare.cycle() == (0, 0, 0, 1)
+
+
+@cocotb.test()
 async def points_and_position_may_wrap(dut):
     compare, top = await begin(dut), (1 << 47) - 1
     for sign in (1, -1):

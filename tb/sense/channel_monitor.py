@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model of rtl/sense/channel_monitor.sv for many signals side by side: sample() processes one
-sample of each.
+"""Model of rtl/sense/channel_monitor.sv for many signals side by side: Channel.sample() processes
+one sample of one channel of each, ChannelMonitor.sample() one of both channels.
 """
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 NEVER = 65535
 
 
-class ChannelMonitor:
+class Channel:
     def __init__(self, lanes=1):
         zeros = lambda: np.zeros(lanes, np.int64)
         self.started = False
@@ -20,7 +20,8 @@ class ChannelMonitor:
             self.same,
             self.channel_stuck,
             self.recent,
-        ) = (zeros() for _ in range(7))
+            self.no_noise,
+        ) = (zeros() for _ in range(8))
         self.sign, self.sign_before, self.side, self.changes, self.half_periods_seen = (
             zeros() for _ in range(5)
         )
@@ -56,10 +57,11 @@ class ChannelMonitor:
             np.where(at_rest, self.other_rest, other),
         )
 
-        self.same = np.where(
-            (channel == self.last) & self.started, np.minimum(self.same + 1, 65535), 0
+        same_code = (channel == self.last) & self.started
+        self.same = np.where(same_code, (self.same + 1) % 65536, 0)
+        self.no_noise = (
+            same_code & (no_noise_samples != 0) & (self.no_noise | (self.same >= no_noise_samples))
         )
-        no_noise = (no_noise_samples != 0) & (self.same >= no_noise_samples)
 
         sign = np.where(size > sign_threshold, np.sign(channel), 0)
         comparator_mismatch = (
@@ -89,8 +91,44 @@ class ChannelMonitor:
         return (
             clipped,
             self.channel_stuck,
-            no_noise,
+            self.no_noise,
             comparator_mismatch,
             self.changes == 3,
             (self.half_periods_seen == 3) & (self.side != 0),
         )
+
+
+class ChannelMonitor:
+    """Both channels."""
+
+    def __init__(self, lanes=1):
+        self.cos, self.sin = Channel(lanes), Channel(lanes)
+        self.last_sin, self.last_cos, self.step = (np.zeros(lanes, np.int64) for _ in range(3))
+        self.seen = 0
+
+    def sample(
+        self,
+        sin,
+        cos,
+        a,
+        b,
+        clip_level,
+        jump,
+        band,
+        span,
+        no_noise_samples,
+        sign_threshold,
+    ):
+        """Returns clipped, jumped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck,
+        channel_missing.
+        """
+        distance = np.maximum(abs(sin - self.last_sin), abs(cos - self.last_cos))
+        jumped = (self.seen >= 2) & (jump != NEVER) & (distance > 2 * self.step + jump)
+        self.last_sin, self.last_cos, self.step, self.seen = sin, cos, distance, self.seen + 1
+        settings = clip_level, band, span, no_noise_samples, sign_threshold
+        of_cos, of_sin = (
+            self.cos.sample(cos, sin, a, b, *settings),
+            self.sin.sample(sin, cos, b, a, *settings),
+        )
+        clipped, *others = (x | y for x, y in zip(of_cos, of_sin))
+        return clipped, jumped, *others

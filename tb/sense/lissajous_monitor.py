@@ -15,6 +15,9 @@ class LissajousMonitor:
         self.sector, self.side, self.middle = (np.zeros((2, lanes), np.int64) for _ in range(3))
         self.met = np.zeros((2, lanes), bool)
         self.lane, self.started = np.arange(lanes), False
+        # 0: the shape at the axes is judged, 1: at the diagonals
+        self.shape_kind, self.drift = 0, np.zeros((2, lanes), bool)
+        self.oval = np.zeros((2, lanes), bool)
 
     def sample(
         self, length, axis, quadrant, tilt, tolerance, offset_limit, balance_limit, quadrature_limit
@@ -29,17 +32,14 @@ class LissajousMonitor:
         )
         expected = at_axis + ((at_diagonal - at_axis) * tilt >> 2)
         off_circle = ready & (tolerance != NEVER) & (abs(length - expected) > tolerance)
-        east, north, west, south = (self.lengths[:, n] for n in range(4))
-        offset = np.maximum(abs(east - west), abs(north - south)).max(axis=0)
+        east, north, west, south = self.lengths[self.shape_kind]
+        offset = np.maximum(abs(east - west), abs(north - south))
         oval = abs(east + west - north - south)
-        drift, unbalanced, skewed = (
-            ready & (limit != NEVER) & (size > 2 * limit)
-            for size, limit in [
-                (offset, offset_limit),
-                (oval[0], balance_limit),
-                (oval[1], quadrature_limit),
-            ]
-        )
+        limit = (balance_limit, quadrature_limit)[self.shape_kind]
+        self.drift[self.shape_kind] = ready & (offset_limit != NEVER) & (offset > 2 * offset_limit)
+        self.oval[self.shape_kind] = ready & (limit != NEVER) & (oval > 2 * limit)
+        self.shape_kind = 1 - self.shape_kind
+        drift, (unbalanced, skewed) = self.drift.any(axis=0), self.oval.copy()
         for kind, sector, close in [(0, axis, tilt == 0), (1, quadrant, tilt == 4)]:
             onward = (sector - self.sector[kind]) % 4 if self.started else np.full(sector.shape, 2)
             (crossed,) = np.nonzero(

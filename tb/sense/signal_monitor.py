@@ -53,37 +53,37 @@ class Twice:
 
 class SignalMonitor:
     def __init__(self, lanes=1):
-        self.cos, self.sin, self.circle = (
-            ChannelMonitor(lanes),
-            ChannelMonitor(lanes),
-            LissajousMonitor(lanes),
-        )
+        self.channels, self.circle = ChannelMonitor(lanes), LissajousMonitor(lanes)
         self.twice = {
             name: Twice(lanes)
             for name in ("too_low", "too_high", "clipped", "off_circle", "comparator_mismatch")
         }
-        self.last_sin, self.last_cos, self.step = (np.zeros(lanes, np.int64) for _ in range(3))
-        self.seen, self.amplitude, self.ready = 0, np.zeros(lanes, np.int64), np.zeros(lanes, bool)
+        self.amplitude, self.ready = np.zeros(lanes, np.int64), np.zeros(lanes, bool)
 
     def sample(self, sin, cos, a, b, settings):
         """Returns the faults 0 … 12 of this sample as bits; sin, cos, a, b are integer arrays with
         one element per signal.
         """
         s = settings
-        distance = np.maximum(abs(sin - self.last_sin), abs(cos - self.last_cos))
-        jumped = (self.seen >= 2) & (s.jump != NEVER) & (distance > 2 * self.step + s.jump)
-        self.last_sin, self.last_cos, self.step, self.seen = sin, cos, distance, self.seen + 1
-
-        channels = zip(
-            self.cos.sample(
-                cos, sin, a, b, s.clip_level, s.band, s.span, s.no_noise_samples, s.sign_threshold
-            ),
-            self.sin.sample(
-                sin, cos, b, a, s.clip_level, s.band, s.span, s.no_noise_samples, s.sign_threshold
-            ),
-        )
-        clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck, channel_missing = (
-            x | y for x, y in channels
+        (
+            clipped,
+            jumped,
+            channel_stuck,
+            no_noise,
+            comparator_mismatch,
+            comparator_stuck,
+            channel_missing,
+        ) = self.channels.sample(
+            sin,
+            cos,
+            a,
+            b,
+            s.clip_level,
+            s.jump,
+            s.band,
+            s.span,
+            s.no_noise_samples,
+            s.sign_threshold,
         )
 
         self.amplitude, axis, quadrant, tilt = vector_length(sin, cos)

@@ -3,8 +3,6 @@
 
 import numpy as np
 
-F = 4  # fraction bits
-
 
 def vector_length(sin, cos):
     """Returns (length, axis, quadrant, tilt)."""
@@ -12,11 +10,9 @@ def vector_length(sin, cos):
     sin_size, cos_size = abs(sin), abs(cos)
     sin_low, cos_low, steep = sin < 0, cos < 0, sin_size > cos_size
     major, minor = np.maximum(sin_size, cos_size), np.minimum(sin_size, cos_size)
-    x, y = major << F, minor << F
-    for k in range(1, 5):
-        turn = np.where(y < 0, -1, 1)
-        x, y = x + turn * (y >> k), y - turn * (x >> k)
-    length = x - (x >> 3) - (x >> 6) + (1 << F - 1) >> F
+    # exact: a double holds 53 bits, and the root of one is rounded correctly
+    twice = np.sqrt(4 * (sin * sin + cos * cos)).astype(np.int64)
+    length = twice + 1 >> 1
     axis = np.where(steep, 1 + 2 * sin_low, 2 * cos_low)
     quadrant = 2 * sin_low + (sin_low ^ cos_low)
     tilt = sum((8 * minor > n * major).astype(np.int64) for n in (1, 3, 5, 7))

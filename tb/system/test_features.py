@@ -22,7 +22,7 @@ from tb.bench import ROOT, package, run, search_path, source_of, start
 ALL = 255
 BLOCKS = ("axis", "feedback", "actuator")
 MODULES = {  # of a feature, which are gone without it
-    "sine": ("dual_adc_reader", "outlier_filter", "signal_correction", "arctan_pipelined"),
+    "sine": ("dual_adc_reader", "outlier_filter", "signal_correction", "arctan_quotient"),
     "monitor": ("signal_monitor", "lissajous_monitor", "channel_monitor", "vector_length"),
     "harmonics": ("harmonic_correction",),
     "recorder": ("calibration_recorder",),
@@ -164,11 +164,13 @@ def test_an_axis_without_a_feature_has_no_warning_beside_one_with_it(feature):
     assert verilator("node", of_axes) == ""
 
 
-@pytest.mark.parametrize("cycles", [7, 8])
-def test_a_chain_of_eight_axes_takes_samples_that_are_eight_cycles_apart(cycles):
-    said = verilator("interpolation_chain", dict(AXES=8, SAMPLE_CYCLES=cycles))
-    assert ("SAMPLES_COME_TOO_FAST_FOR_THE_AXES" in said) == (cycles < 8)
-    assert said == "" or cycles < 8
+@pytest.mark.parametrize("axes, cycles", [(8, 7), (8, 8), (1, 0), (1, 12)])
+def test_a_chain_takes_samples_of_an_axis_that_are_as_many_cycles_apart_as_it_has_axes(
+    axes, cycles
+):
+    said = verilator("interpolation_chain", dict(AXES=axes, SAMPLE_CYCLES=cycles))
+    assert ("SAMPLES_COME_TOO_FAST_FOR_THE_AXES" in said) == (cycles < axes)
+    assert said == "" or cycles < axes
 
 
 @pytest.mark.parametrize("rule", WRONG)

@@ -4,24 +4,7 @@
  * access to them, and writes the results to the registers, one after the other. Then it executes
  * the wrong access that the register ORDER selects; all orders above 0 must trap.
  */
-typedef unsigned int u32;
-typedef unsigned short u16;
-typedef unsigned char u8;
-
-#define REGISTERS 0x80000000u
-#define REGISTER(offset) (*(volatile u32*)(REGISTERS + (offset)))
-#define A REGISTER(0x000)
-#define B REGISTER(0x004)
-#define ORDER REGISTER(0x008)
-#define STACK REGISTER(0x00C)
-#define STARTS REGISTER(0x010)
-#define RESULT REGISTER(0xFFFC)
-#define TWO(mnemonic)                                                        \
-    do {                                                                     \
-        u32 r;                                                               \
-        __asm__ volatile(mnemonic " %0, %1, %2" : "=r"(r) : "r"(a), "r"(b)); \
-        RESULT = r;                                                          \
-    } while (0)
+#include "core_program.h"
 
 /* Compressed instructions: `code` computes a0 from a0 (operand a) and a1 (operand b). It may change
  * a2 and a3, and a4 is the address of two words. */
@@ -43,12 +26,11 @@ __asm__(
     "    j main\n");
 
 u32 starts = 0x1000; /* a reset does not clear the memory */
-volatile u32 here[2];
 
 void main(void) {
     STARTS = ++starts;
     for (;;) {
-        u32 a = A, b = B;
+        u32 a = A, b = B, order;
         TWO("add");
         TWO("sub");
         TWO("and");
@@ -100,32 +82,11 @@ void main(void) {
         COMPRESSED(
             "c.li a2, 5\n .p2align 2\n c.nop\n 1: add a0, a0, a1\n c.addi a2, -1\n bnez a2, 1b");
 
-        volatile u8* bytes = (volatile u8*)here;
-        volatile u16* halves = (volatile u16*)here;
-        here[0] = a;
-        here[1] = b;
-        for (int n = 0; n < 8; n++) RESULT = bytes[n];
-        for (int n = 0; n < 8; n++) RESULT = (u32)((volatile signed char*)here)[n];
-        for (int n = 0; n < 4; n++) RESULT = halves[n];
-        for (int n = 0; n < 4; n++) RESULT = (u32)((volatile short*)here)[n];
-        for (int n = 0; n < 4; n++) bytes[n] = (u8)(b >> 8 * n);
-        for (int n = 0; n < 2; n++) halves[2 + n] = (u16)(a >> 16 * n);
-        RESULT = here[0];
-        RESULT = here[1];
-        bytes[2] = 0x5A;
-        halves[3] = 0xA55A;
-        RESULT = here[0];
-        RESULT = here[1];
+        access_memory(a, b);
         RESULT = ((volatile u8*)REGISTERS)[1]; /* a byte of a register may be read */
 
-        switch (ORDER) {
-        case 0: break;
-        case 1: RESULT = *(volatile u32*)MEMORY_BYTES; break;
-        case 2: *(volatile u32*)MEMORY_BYTES = 1; break;
-        case 3: *(volatile u32*)(REGISTERS + 0x10000) = 1; break;
-        case 4: RESULT = *(volatile u32*)0xFFFFFFFCu; break;
-        case 5: *(volatile u8*)REGISTERS = 1; break;
-        case 6: *(volatile u16*)(REGISTERS + 2) = 1; break;
+        order = ORDER;
+        switch (order) {
         case 7: __asm__ volatile("lw t0, 2(%0)" : : "r"(here) : "t0"); break;
         case 8: __asm__ volatile("sh t0, 1(%0)" : : "r"(here)); break;
         case 9: __asm__ volatile(".word 0"); break;
@@ -133,7 +94,7 @@ void main(void) {
         case 11: ((void (*)(void))REGISTERS)(); break;
         case 12: ((void (*)(void))0x40000000)(); break;
         case 13: __asm__ volatile("c.ebreak"); break;
-        default: break;
+        default: access_wrongly(order); break;
         }
     }
 }
