@@ -44,7 +44,7 @@ WORKS = re.compile(
     r"^(?:node__DOT__)?now$|(?:^|__DOT__)(?:u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|"
     r"u_core_wait__\w+|u_engine__DOT__(?!u_settings)\w+|u_lines__\w+|u_chain__\w+|"
     r"u_monitor__\w+|u_adc__\w+|u_recorder__\w+|u_position__\w+|"
-    r"u_compare__DOT__(?:timer|here|arrived)|u_filter__\w+|"
+    r"u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|"
     r"raw_sin|raw_cos|plain_phase|age|since|tick|limit_tick|sample_tick|due|scale_valid|stepped|"
     r"counted|strobe|result|result_\w+)$"
 )
