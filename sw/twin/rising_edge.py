@@ -34,15 +34,19 @@ NAME = re.compile(
 CALL = re.compile(rf"{ROOT}___(\w+)\(vlSelf\);")
 RESET = re.compile(r"\(IData\)\(vlSelfRef\.rst\)|vlSelfRef\.rst\b")
 NEVER = "0U"  # its level
-# Whether the soft core waits; then most of the design does nothing, but for these blocks.
+# Whether the soft core waits; then most of the design does nothing, but for what changes by itself:
+# counters, the engine, and the way of a sample from the converter to the position. A register that
+# is missing here costs time only; tb/twin/test_rising_edge.py sees it.
 CORE = "vlSelfRef.node__DOT__g_core__DOT__u_core__DOT__"
 WAITS = f"vlSelfRef.node__DOT__core_waits & {CORE}mem_valid & {CORE}mem_addr >> 31"
 SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
 WORKS = re.compile(
-    r"(?:^|__DOT__)(?:now|u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|u_core_wait__\w+|"
-    r"u_engine__DOT__(?!u_settings)\w+|u_lines__\w+|u_chain__\w+|u_monitor__\w+|"
-    r"u_adc__\w+|age|since|timer|limit_tick|sample_tick|due|scale_valid|stepped|counted|strobe|"
-    r"arrived|result_\w+)$"
+    r"^(?:node__DOT__)?now$|(?:^|__DOT__)(?:u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|"
+    r"u_core_wait__\w+|u_engine__DOT__(?!u_settings)\w+|u_lines__\w+|u_chain__\w+|"
+    r"u_monitor__\w+|u_adc__\w+|u_recorder__\w+|u_position__\w+|"
+    r"u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|"
+    r"raw_sin|raw_cos|plain_phase|age|since|tick|limit_tick|sample_tick|due|scale_valid|stepped|"
+    r"counted|strobe|result|result_\w+)$"
 )
 PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
 

@@ -216,13 +216,15 @@ def signals(folder: Path) -> str:
     )
 
 
-# cycles: the soft core waits from 900 000 on for each axis
+WAITS_FROM = 900_000  # cycles for each axis; then the soft core waits most of the time
+
+
 @pytest.mark.parametrize(
-    "node, axes, cycles", [(NODE, 1, 1_600_000), (s2_stage.NODE, 2, 2_600_000)]
+    "node, axes, clk_hz, cycles",
+    [(NODE, 1, 2_400_000, 1_600_000), (s2_stage.NODE, 2, 12_000_000, 2_600_000)],
 )
-def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes, cycles):
+def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes, clk_hz, cycles):
     tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
-    clk_hz = 2_400_000 * axes
     build.verilate_node(tmp_path, verilator, clk_hz, axes, node)
     (tmp_path / "signals.h").write_text(signals(tmp_path))
     (tmp_path / "firmware").write_text("\n".join(f"{w:x}" for w in build.firmware(axes=axes)))
@@ -236,5 +238,5 @@ def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes
     print(f"SEED={seed}")
     output = build.run([program, tmp_path / "firmware", cycles, seed], "run of both")
     assert output.startswith(f"the same for {cycles} cycles")
-    # long enough to compare what rests; how much it rests is a matter of the seed's requests
-    assert int(output.split()[-1]) > cycles / 20, "it rested too seldom"
+    # how much it rests is a matter of the seed's requests
+    assert int(output.split()[-1]) > (cycles - axes * WAITS_FROM) / 5, "it rested too seldom"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A machine as one axis of a node sees it: pins in, pins out, advanced cycle by cycle. An idle
-// machine costs one comparison a cycle: it is called when a pin that drives it changes, and at the
-// time that it requested.
+// machine costs nothing: it is called when a pin that drives it or another machine of its node
+// changes, at the time that it or another requested, and at the beginning of each run.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -24,6 +24,7 @@ enum Drive : unsigned {  // pins that the node drives
     DAC_SCLK = 1 << 8,
     DAC_SDI = 1 << 9,
 };
+constexpr unsigned DRIVE_PINS = 10;
 
 enum Sense : unsigned {  // pins that the machine drives
     ENCODER_A = 1 << 0,

@@ -3,20 +3,33 @@
 // machine and one for the peripherals, and back.
 #pragma once
 #include <cstdint>
+#include <cstring>
 
 #include "machines/machine.h"
 #include "devices/devices.h"
 
 namespace twin {
 
-template <class Pins>
-unsigned drive_of(const Pins& pins, int n) {  // Drive of axis n
-    return (pins.adc_cs_n >> n & 1) * ADC_CS_N | (pins.adc_sclk >> n & 1) * ADC_SCLK |
-           (pins.bridge_a >> n & 1) * BRIDGE_A | (pins.bridge_b >> n & 1) * BRIDGE_B |
-           (pins.drive_enable >> n & 1) * DRIVE_ENABLE | (pins.step >> n & 1) * STEP |
-           (pins.direction >> n & 1) * DIRECTION | (pins.dac_cs_n >> n & 1) * DAC_CS_N |
-           (pins.dac_sclk >> n & 1) * DAC_SCLK | (pins.dac_sdi >> n & 1) * DAC_SDI;
-}
+class DrivePins {  // those that the node drives, of all axes
+ public:
+    template <class Pins>
+    bool take(const Pins& pins) {  // true when one has changed
+        const uint32_t now[DRIVE_PINS] = {
+            pins.adc_cs_n, pins.adc_sclk,  pins.bridge_a, pins.bridge_b, pins.drive_enable,
+            pins.step,     pins.direction, pins.dac_cs_n, pins.dac_sclk, pins.dac_sdi};
+        if (!std::memcmp(now, vectors_, sizeof now)) return false;
+        std::memcpy(vectors_, now, sizeof now);
+        return true;
+    }
+    unsigned of(int n) const {  // Drive of axis n
+        unsigned levels = 0;
+        for (unsigned bit = 0; bit < DRIVE_PINS; bit++) levels |= (vectors_[bit] >> n & 1) << bit;
+        return levels;
+    }
+
+ private:
+    uint32_t vectors_[DRIVE_PINS] = {};
+};
 
 class SensePins {
  public:

@@ -83,9 +83,15 @@ class Node {
             auto& pins = core_->pins;
             pins.rs485_rx = rs485_rx;
             core_->clk();
-            for (int n = 0; n < AXES; n++)
-                changed |= machines[size_t(n)]->clk(now, drive_of(pins, n));
-            if (changed) sense();
+            if (drives_.take(pins) || now >= event_at_) {
+                event_at_ = NEVER;
+                for (int n = 0; n < AXES; n++) {
+                    Machine& machine = *machines[size_t(n)];
+                    changed |= machine.clk(now, drives_.of(n));
+                    event_at_ = std::min(event_at_, machine.event_at());
+                }
+                if (changed) sense();
+            }
             if (devices && devices->clk(now, peripheral_drive_of(pins)))
                 set_peripheral_pins(pins, devices->levels());
             line_drives = pins.rs485_driver_enable;
@@ -95,6 +101,7 @@ class Node {
             if (devices) devices->clk(now, PERIPHERAL_DRIVE_IDLE);
         }
     }
+    void look() { event_at_ = 0; }  // at each machine in the next cycle: one may have been changed
     bool peer_tx() const { return !core_ || core_->pins.peer_tx; }
     void hear_peer(bool level) {
         if (core_) core_->pins.peer_rx = level;
@@ -136,6 +143,8 @@ class Node {
     unsigned address_;
     const Firmware& firmware_;
     std::optional<Core> core_;  // without power there is none
+    DrivePins drives_;
+    uint64_t event_at_ = 0;  // cycle in which a machine is to be called at the latest
     bool estop_ = false;
 };
 
@@ -152,6 +161,9 @@ class Twin {
         for (int n = 0; n < count; n++)
             nodes.emplace_back(
                 new Node(addresses[n], firmware_, kinds + n * AXES, parameters + n * AXES, seed));
+    }
+    void begin() {  // before the first of several steps
+        for (auto& node : nodes) node->look();
     }
     void step() {
         now++;
@@ -251,11 +263,13 @@ void* twin_new(uint64_t seed, int nodes, const uint8_t* addresses, const uint32_
 void twin_delete(Twin* t) { delete t; }
 uint64_t twin_now(Twin* t) { return t->now; }
 void twin_run(Twin* t, uint64_t clk) {
+    t->begin();
     while (clk--) t->step();
 }
 // Runs until `words` words are there or `clk` cycles have passed; returns how many are there.
 int twin_run_until_words(Twin* t, int words, uint64_t clk) {
     const auto& received = t->bus.host.received;
+    t->begin();
     while (received.size() < size_t(words) && clk--) t->step();
     return int(received.size());
 }
