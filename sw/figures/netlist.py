@@ -26,7 +26,8 @@ POWER_UPS = 3  # random states after power-up, of each block
 REFERENCE = Path(__file__).with_name("bitstream.sha256")
 SMALL = "uart_tx"  # the block of which a bitstream is built twice
 SYNTHESIS = (
-    "read_verilog -sv {source}; hierarchy -check -top {top}; synth_ecp5 -top {top} -json {out}"
+    "read_verilog -sv {source}; hierarchy -check -top {top} -libdir .; "
+    "synth_ecp5 -top {top} -json {out}"
 )
 
 
@@ -102,7 +103,8 @@ def built(folder: Path, **environment: str) -> str:
     its source. Its netlist is not compared: it names the places of Yosys's own sources.
     """
     source = next((ROOT / "rtl").rglob(f"{SMALL}.sv"))
-    shutil.copy(source, folder)
+    for one in source.parent.glob("*.sv"):  # the blocks in it are in the same directory
+        shutil.copy(one, folder)
     script = SYNTHESIS.format(source=source.name, top=SMALL, out="netlist.json")
     tool([sys.executable, str(ROOT / "tools" / "yosys.py"), script], folder, **environment)
     programs = Path(sys.executable).parent

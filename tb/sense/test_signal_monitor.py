@@ -197,7 +197,7 @@ async def each_fault_of_a_moving_signal_has_its_name(dut):
         ("not_in_quadrature", lambda cos, sin: (cos, sin + 0.2 * cos)),
     ]:
         watch, size = await ready(dut)
-        await watch.turn(size, 4.0, steps=30, distort=distort)
+        await watch.turn(size, 4.0, distort=distort)
         await watch.idle()
         assert name in names(watch.seen), f"{name} is not among {names(watch.seen)}"
 
