@@ -124,7 +124,7 @@ module node #(
     wire [15:0] bus_address;
     wire [31:0] wdata, wdata_low, rdata;
     wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata;
-    wire memory_ready, stores, hold, engine_waits, core_waits;
+    wire memory_ready, stores, hold, engine_waits, core_waits, crc_waits;
     wire [13:0] stored_at;
     wire [31:0] stored_value;
     wire [32*AXES-1:0] axis_rdata, feedback_rdata, actuator_rdata;
@@ -176,7 +176,7 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (memory_ready && !engine_waits && !core_waits),
+            .ready  (memory_ready && !engine_waits && !core_waits && !crc_waits),
             .select,
             .write,
             .address(bus_address),
@@ -196,7 +196,7 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (memory_ready && !engine_waits && !core_waits),
+            .ready  (memory_ready && !engine_waits && !core_waits && !crc_waits),
             .select,
             .write,
             .address(bus_address),
@@ -439,6 +439,7 @@ module node #(
         .armed,
         .watchdog_expired,
         .word_received,
+        .crc_waits,
         .sync,
         .sync_axes,
         // pins

@@ -25,6 +25,7 @@ module rs485_port #(
     input  wire         armed,               // level: a drive is on
     output logic        watchdog_expired,    // level: the master has been silent too long
     output logic        word_received,       // level: a received word has not been read
+    output logic        crc_waits,           // level: the CRC-32 takes in a byte: no access
     output logic        sync,                // strobe: sync pulse of the bus
     output logic [ 7:0] sync_axes,           // bit n: axis n starts with sync
     // pins
@@ -171,7 +172,7 @@ module rs485_port #(
         .driver_enable(rs485_driver_enable),
         .expired      (transmit_expired)
     );
-    // the soft core needs more than 9 cycles for a byte, and the register keeps it
+    // the register keeps the byte; the next access of the soft core waits while crc_waits
     /* verilator lint_off PINCONNECTEMPTY */
     crc32_serial u_crc (
         .clk,
@@ -180,6 +181,7 @@ module rs485_port #(
         .valid(crc_byte_written),
         .data (crc_byte),
         .check(1'b0),
+        .busy (crc_waits),
         .done (),
         .wrong(),
         .crc

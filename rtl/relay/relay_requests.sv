@@ -28,7 +28,7 @@ module relay_requests #(
     input  wire               valid,         // strobe: data is new
     input  wire        [ 7:0] data,          // byte of a frame
     input  wire               command,       // level: data is a command byte
-    input  wire               good,          // level: data is the last byte of a good frame
+    input  wire               good,          // strobe: data is the last byte of a good frame
     // status
     input  wire        [ 7:0] events,        // strobes or levels: each sets its flag
     input  wire        [ 7:0] levels,        // as in the header of relay

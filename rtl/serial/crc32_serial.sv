@@ -20,6 +20,7 @@ module crc32_serial (
     input  wire         valid,  // strobe: data is the next byte
     input  wire  [ 7:0] data,   // byte
     input  wire         check,  // level: data is a byte of the CRC-32
+    output logic        busy,   // level: the byte is being taken in
     output logic        done,   // strobe: the byte is taken in
     output logic        wrong,  // level: a byte with check has differed since start
     output logic [31:0] crc     // CRC-32 of the bytes since start, while there was none with check
@@ -29,11 +30,11 @@ module crc32_serial (
     logic [31:0] remainder;
     logic [ 3:0] number;  // of the bit; 8: none
 
-    wire         busy = !number[3];
     wire         differs = remainder[0] ^ data[number[2:0]];
     wire         divides = differs && !check;
 
-    assign crc = ~remainder;
+    assign busy = !number[3];
+    assign crc  = ~remainder;
 
     always_ff @(posedge clk) begin
         if (start) remainder <= '1;

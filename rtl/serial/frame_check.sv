@@ -68,6 +68,7 @@ module frame_check #(
         .valid(valid_in),
         .data,
         .check(checked),
+        .busy (),
         .done,
         .wrong,
         .crc  ()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/serial/crc32_serial.sv, made with zlib: step(start, valid, data, check) advances one
-cycle and returns (done, wrong, crc) after it; wrong and crc are None where they are not defined.
+cycle and returns (busy, done, wrong, crc) after it; wrong and crc are None where they are not
+defined.
 """
 
 import zlib
@@ -27,4 +28,4 @@ class Crc32Serial:
                 self.crc = zlib.crc32(bytes([data]), self.crc)
         ready = not self.left
         crc = self.crc if ready and not self.checked else None
-        return int(done and not rst), self.wrong if ready else None, crc
+        return int(self.left > 0), int(done and not rst), self.wrong if ready else None, crc

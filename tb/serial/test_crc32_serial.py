@@ -30,8 +30,8 @@ class Bench:
         if data is not None:
             d.data.value, d.check.value = data, check or 0
         await FallingEdge(d.clk)
-        done, wrong, crc = self.model.step(start, valid, data, check, rst)
-        assert int(d.done.value) == done
+        busy, done, wrong, crc = self.model.step(start, valid, data, check, rst)
+        assert (int(d.busy.value), int(d.done.value)) == (busy, done)
         assert wrong is None or int(d.wrong.value) == wrong
         assert crc is None or int(d.crc.value) == crc
         return done
