@@ -43,7 +43,7 @@ module relay_bridge #(
     wire received, ninth, framing_error, own, passed, good;
     wire answer_valid, answer_ready;
     wire [7:0] character, answer;
-    wire unused_glitch, unused_receiving, unused_level, unused_bad, unused_sync;
+    wire unused_glitch, unused_receiving, unused_last, unused_bad, unused_sync;
     wire unused_sending, unused_tick;
 
     uart_rx u_receiver (
@@ -77,7 +77,7 @@ module relay_bridge #(
         .command   (ninth),
         .framing_error,
         .valid     (passed),
-        .good      (unused_level),
+        .good      (unused_last),
         .frame_good(good),
         .frame_bad (unused_bad),
         .sync      (unused_sync)
@@ -126,7 +126,7 @@ module relay_bridge #(
     );
 
     wire unused = &{
-        1'b0, unused_glitch, unused_receiving, unused_level, unused_bad, unused_sync, unused_sending,
+        1'b0, unused_glitch, unused_receiving, unused_last, unused_bad, unused_sync, unused_sending,
         unused_tick
     };
 endmodule
