@@ -39,7 +39,7 @@ HARDWARE = re.compile(r"/dev/ttyUSB0|COM3|socket://127\.0\.0\.1:2218")
 RESOLVED_ONLY = re.compile(r"make (test$|check|figures|soak|board|load|flash)")
 ENDLESS = re.compile(r"moire\b.* watch\b|moire watch\b")
 EXPERIMENT = re.compile(r"build/venv/bin/python -m experiments\.")
-LONGEST_S = 7  # of an experiment, unless the whole is asked for; its twin is built within 4
+LONGEST_S = 6  # of an experiment, unless the whole is asked for; its twin is built within 4
 ENDLESS_S = 4  # of a command that only Ctrl-C ends
 PATIENCE_S = 600  # of every other command
 

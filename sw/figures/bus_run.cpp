@@ -101,6 +101,7 @@ class Node {
     std::vector<unsigned> heard;  // words that the master receives
 
     uint32_t access(bool write, uint32_t offset, uint32_t value) {
+        while (top_.crc_waits) clk();
         top_.select = 1, top_.write = write, top_.word = uint8_t(offset / 4), top_.wdata = value;
         clk();
         const uint32_t read = top_.rdata;
