@@ -75,8 +75,8 @@ FIGURES = {
         growth_twin,
         "",
         f"time of one core for a cycle of a node with {MOST_AXES} step axes and their machines, "
-        f"divided by the time with one axis; drives off, from {STARTED_S} s after power-up on, when "
-        "both soft cores wait",
+        f"divided by the time with one axis; drives off, from {STARTED_S} s after power-up on, "
+        "when both soft cores wait",
         "<= 2.5",
         Quick(
             {"cycles": 100_000, "rounds": 2, "axes": 2, "started_s": 0.1},
