@@ -23,6 +23,20 @@ typedef unsigned char u8;
 
 volatile u32 here[2];
 
+/* The operations of rv32i with two operands. */
+static inline void operate(u32 a, u32 b) {
+    TWO("add");
+    TWO("sub");
+    TWO("and");
+    TWO("or");
+    TWO("xor");
+    TWO("sll");
+    TWO("srl");
+    TWO("sra");
+    TWO("slt");
+    TWO("sltu");
+}
+
 /* Writes both words with each width, reads them with each width, and shows them. */
 static inline void access_memory(u32 a, u32 b) {
     volatile u8* bytes = (volatile u8*)here;

@@ -19,6 +19,12 @@ def signed(x, w=32):
     return (x & (1 << w) - 1) - (1 << w if x >> w - 1 & 1 else 0)
 
 
+def operation_results(a, b):
+    """The results of operate() in core_program.h, not yet cut to 32 bits."""
+    sa, sb, n = signed(a), signed(b), b & 31
+    return [a + b, a - b, a & b, a | b, a ^ b, a << n, a >> n, sa >> n, sa < sb, a < b]
+
+
 def memory_results(a, b):
     """The results of access_memory() in core_program.h."""
     memory = a.to_bytes(4, "little") + b.to_bytes(4, "little")

@@ -3,12 +3,12 @@
 in which the program writes them.
 """
 
-from tb.cpu.core_program import MASK, memory_results, signed
+from tb.cpu.core_program import MASK, memory_results, operation_results, signed
 
 
 def results(a, b):
-    sa, sb, n = signed(a), signed(b), b & 31
-    out = [a + b, a - b, a & b, a | b, a ^ b, a << n, a >> n, sa >> n, sa < sb, a < b]
+    sa, sb = signed(a), signed(b)
+    out = operation_results(a, b)
     out += [a - 32, a & 21, a | 21, a ^ 21, sa < 5, a < 5, a << 7, a >> 31, sa >> 3]
     out += [
         (a == b) + 2 * (a != b) + 4 * (sa < sb) + 8 * (sa >= sb) + 16 * (a < b) + 32 * (a >= b),

@@ -34,16 +34,7 @@ void main(void) {
     STARTS = ++starts;
     for (;;) {
         u32 a = A, b = B, taken = 0, upper, after, order;
-        TWO("add");
-        TWO("sub");
-        TWO("and");
-        TWO("or");
-        TWO("xor");
-        TWO("sll");
-        TWO("srl");
-        TWO("sra");
-        TWO("slt");
-        TWO("sltu");
+        operate(a, b);
         ONE("addi", -32);
         ONE("andi", 21);
         ONE("ori", 21);

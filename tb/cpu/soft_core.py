@@ -3,7 +3,7 @@
 in which the program writes them.
 """
 
-from tb.cpu.core_program import MASK, memory_results, signed
+from tb.cpu.core_program import MASK, memory_results, operation_results, signed
 
 
 def divide(a, b):
@@ -17,18 +17,9 @@ def divide(a, b):
 
 
 def results(a, b):
-    sa, sb, n = signed(a), signed(b), b & 31
+    sa, sb = signed(a), signed(b)
     out = [
-        a + b,
-        a - b,
-        a & b,
-        a | b,
-        a ^ b,
-        a << n,
-        a >> n,
-        sa >> n,
-        sa < sb,
-        a < b,
+        *operation_results(a, b),
         a * b,
         sa * sb >> 32,
         sa * b >> 32,

@@ -31,16 +31,7 @@ void main(void) {
     STARTS = ++starts;
     for (;;) {
         u32 a = A, b = B, order;
-        TWO("add");
-        TWO("sub");
-        TWO("and");
-        TWO("or");
-        TWO("xor");
-        TWO("sll");
-        TWO("srl");
-        TWO("sra");
-        TWO("slt");
-        TWO("sltu");
+        operate(a, b);
         TWO("mul");
         TWO("mulh");
         TWO("mulhsu");
