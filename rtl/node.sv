@@ -168,6 +168,8 @@ module node #(
     // interlock
     wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
 
+    wire registers_ready = memory_ready && !engine_waits && !core_waits && !crc_waits;
+
     if (HAS_SERIAL_CORE != 0) begin : g_serial_core
         serial_core #(
             .MEMORY_BYTES (MEMORY_BYTES),
@@ -176,7 +178,7 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (memory_ready && !engine_waits && !core_waits && !crc_waits),
+            .ready  (registers_ready),
             .select,
             .write,
             .address(bus_address),
@@ -196,7 +198,7 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (memory_ready && !engine_waits && !core_waits && !crc_waits),
+            .ready  (registers_ready),
             .select,
             .write,
             .address(bus_address),
