@@ -2,7 +2,7 @@
 // serial_core -- bit-serial RISC-V processor (rv32i) with its memory, the smallest master of the
 // register bus.
 //
-// latency   1 wait cycle for an access to the memory, 2 wait cycles for an access to a register,
+// latency   1 wait cycle for an access to the memory, 3 wait cycles for an access to a register,
 //           and as many more as ready is low.
 // rate      An instruction takes 36 to 38 cycles, one with an access to memory, a jump, a branch, a
 //           comparison or a shift 70 to 104.
@@ -23,11 +23,11 @@ module serial_core #(
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire         ready,       // level: the registers take an access
+    input  wire         ready,       // level: the registers take an access in the next cycle
     output logic        select,      // strobe: one access to the registers
     output logic        write,       // level: with select, wdata is to be written
-    output logic [15:0] address,     // byte address of a register
-    output logic [31:0] wdata,       // word to be written
+    output logic [15:0] address,     // byte address of a register, from 1 cycle before select on
+    output logic [31:0] wdata,       // word to be written, from 1 cycle before select on
     input  wire  [31:0] rdata,       // word read, 2 cycles after select
     output logic        trap,        // level: the core has stopped
     // flash
@@ -54,17 +54,20 @@ module serial_core #(
     wire         puts = load_or_store && storing && in_memory && !fetched;
     wire [A-3:0] at = loaded ? access[A-1:2] : (A - 2)'(loaded_at);
 
-    assign select  = valid && in_registers && ready && !awaited && !answered && !trap;
+    wire         free = !(select || awaited || answered);
+
     assign write   = storing;
     assign address = data_address[15:0];
 
     always_ff @(posedge clk) begin
         fetched  <= valid && in_memory && !fetched && !trap;
+        select   <= valid && in_registers && ready && free && !trap;
         awaited  <= select;
         answered <= awaited;
         if (valid && !in_memory && !in_registers) trap <= 1'b1;
         if (rst) begin
             fetched  <= 1'b0;
+            select   <= 1'b0;
             awaited  <= 1'b0;
             answered <= 1'b0;
             trap     <= 1'b0;

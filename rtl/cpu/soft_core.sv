@@ -21,8 +21,9 @@
 // proved    Whatever the core does: an access to no valid address raises trap in the next cycle,
 //           and trap stays high until rst. select is a strobe, only for an access to a whole word
 //           of the registers, only one cycle after ready was high, never for an instruction, and
-//           never in two cycles that follow each other. Each word that the core takes from the
-//           memory was read at the address of the access, after the last write to that address.
+//           never in two cycles that follow each other; address and wdata are there one cycle
+//           before it. Each word that the core takes from the memory was read at the address of the
+//           access, after the last write to that address.
 // proof     depth 12, MEMORY_BYTES = 1024
 `default_nettype none
 
@@ -35,8 +36,8 @@ module soft_core #(
     input  wire         ready,    // level: the registers take an access in the next cycle
     output logic        select,   // strobe: one access to the registers
     output logic        write,    // level: with select, wdata is to be written
-    output logic [15:0] address,  // byte address of a register
-    output logic [31:0] wdata,    // word to be written
+    output logic [15:0] address,  // byte address of a register, from 1 cycle before select on
+    output logic [31:0] wdata,    // word to be written, from 1 cycle before select on
     input  wire  [31:0] rdata,    // word read, 2 cycles after select
     output logic        trap      // level: the core has stopped
 );
@@ -48,9 +49,9 @@ module soft_core #(
     wire [31:0] mem_la_addr;  // of a word: bits 1:0 are zero
     // verilator lint_on UNUSEDSIGNAL
     wire [ 3:0] mem_wstrb;
-    // divisions
-    wire pcpi_valid, pcpi_wait, pcpi_ready;
-    wire [31:0] pcpi_insn, pcpi_rs1, pcpi_rs2, pcpi_rd;
+    // products and divisions
+    wire pcpi_valid, divides, divided, multiplied;
+    wire [31:0] pcpi_insn, pcpi_rs1, pcpi_rs2, quotient, product;
     // the registers will answer in the next cycle, have answered; an access had no valid address
     logic awaited, answered, lost;
     // the first cycle of an access; it reads memory; the memory read `following` one cycle before;
@@ -132,6 +133,16 @@ module soft_core #(
         .rdata        (memory_rdata)
     );
 
+    core_multiplier u_multiplier (
+        .clk,
+        .rst,
+        .valid      (pcpi_valid),
+        .instruction(pcpi_insn),
+        .a          (pcpi_rs1),
+        .b          (pcpi_rs2),
+        .ready      (multiplied),
+        .result     (product)
+    );
     core_divider u_divider (
         .clk,
         .rst,
@@ -139,17 +150,15 @@ module soft_core #(
         .instruction(pcpi_insn),
         .a          (pcpi_rs1),
         .b          (pcpi_rs2),
-        .working    (pcpi_wait),
-        .ready      (pcpi_ready),
-        .result     (pcpi_rd)
+        .working    (divides),
+        .ready      (divided),
+        .result     (quotient)
     );
 
     picorv32 #(
         .ENABLE_COUNTERS  (0),
         .ENABLE_COUNTERS64(0),
         .BARREL_SHIFTER   (1),
-        .ENABLE_MUL       (1),
-        .ENABLE_FAST_MUL  (1),
         .ENABLE_PCPI      (1),
         .COMPRESSED_ISA   (1),
         .CATCH_MISALIGN   (1),
@@ -178,10 +187,10 @@ module soft_core #(
         .pcpi_insn,
         .pcpi_rs1,
         .pcpi_rs2,
-        .pcpi_wr     (pcpi_ready),
-        .pcpi_rd,
-        .pcpi_wait,
-        .pcpi_ready,
+        .pcpi_wr     (multiplied || divided),
+        .pcpi_rd     (multiplied ? product : quotient),
+        .pcpi_wait   (divides),
+        .pcpi_ready  (multiplied || divided),
         .irq         (32'd0),
         // no interrupts, no trace:
         // verilator lint_off PINCONNECTEMPTY
@@ -212,7 +221,7 @@ module soft_core #(
         // and keeps it until then
         if (past && !$past(rst) && $past(mem_valid && !mem_ready)) begin
             assume (mem_valid && $stable(mem_addr));
-            assume ($stable(mem_instr) && $stable(mem_wstrb));
+            assume ($stable(mem_instr) && $stable(mem_wstrb) && $stable(mem_wdata));
         end
         // the address of a word of data was in its operand
         if (past && first && mem_valid && !mem_instr && mem_wstrb == '0 && in_memory)
@@ -223,6 +232,7 @@ module soft_core #(
             assert (32'(select) + 32'(awaited) + 32'(answered) <= 1);
             if (select) assert (mem_valid && !in_memory && !mem_instr && $past(ready));
             if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
+            if (select) assert ($stable(address) && $stable(wdata));
             if (write && select) assert (mem_wstrb == '1);
             if (storing) assert (mem_valid && in_memory);
             if (fresh) assert (read_number == next && !read_old);

@@ -5,11 +5,12 @@
 // latency   1 cycle from select to rdata and to wdata_low; 2048 cycles without hold from the end of
 //           rst to ready
 // rate      one access every 2 cycles
-// behaviour After rst each setting gets its first value, one word in each cycle without hold; until
-//           ready is high there must be no access. stores shows every setting that is written, its
-//           first value too; of a value of 64 bits with its high word. A write of a low word
-//           changes wdata_low only; the write of the high word stores both. There is one wdata_low
-//           for all blocks.
+// behaviour address and wdata are there one cycle before select already: register_layout has that
+//           cycle to find what is stored and where. After rst each setting gets its first value,
+//           one word in each cycle without hold; until ready is high there must be no access.
+//           stores shows every setting that is written, its first value too; of a value of 64 bits
+//           with its high word. A write of a low word changes wdata_low only; the write of the high
+//           word stores both. There is one wdata_low for all blocks.
 // source    register_layout: the layout of the memory, the bits of each setting, the first values
 // model     tb/registers/register_memory.py, equal in every bit of every cycle
 // proved    A read of any word gives what the last write of the word stored, else its first value;
@@ -45,8 +46,8 @@ module register_memory #(
     input  wire         hold,         // level: no first value is stored
     input  wire         select,       // strobe: an access to any block
     input  wire         write,        // level: it writes wdata
-    input  wire  [13:0] address,      // word of the register map
-    input  wire  [31:0] wdata,        // value to write
+    input  wire  [13:0] address,      // word of the register map, the same one cycle before select
+    input  wire  [31:0] wdata,        // value to write, the same one cycle before select
     output logic        ready,        // level: the settings have their first values
     output logic [31:0] rdata,        // settings in the word read last; its other bits are 0
     output logic [31:0] wdata_low,    // low word that waits for its high word
@@ -56,17 +57,20 @@ module register_memory #(
 );
     localparam int W = $clog2(3 + 3 * AXES) + 6;  // bits of a place in the memory
 
-    (* ram_style = STYLE *)logic [ 31:0] memory                                          [0:2**W-1];
-    logic [ 11:0] count;  // words that have their first value
+    logic [ 11:0] next;  // number of the next word that gets its first value
     logic         commit;  // the low word is stored in this cycle
     logic [W-1:0] low_place;
+    // the word at stored_at, which is accessed or gets its first value
+    logic [W-1:0] place;  // where it is in the memory
+    logic low, high;
 
-    wire  [W-1:0] place;
+    wire        fill = !ready && !hold;
+    wire        begins = ready && !rst;  // an access may follow
+    wire [13:0] coming = rst ? '0 : ready ? address : {3'd0, next[10:0]};
+    wire coming_low, coming_high;
+    wire [W-1:0] coming_place;
     wire [31:0] stored_bits, first;
-    wire low, high;
     wire put = select && write;
-
-    assign ready = count[11];
 
     register_layout #(
         .AXES             (AXES),
@@ -84,36 +88,46 @@ module register_memory #(
         .HAS_STEPPER      (HAS_STEPPER),
         .HAS_VELOCITY     (HAS_VELOCITY)
     ) u_layout (
-        .address(stored_at),
+        .address(coming),
         .wdata,
-        .place,
+        .place  (coming_place),
         .stored_bits,
         .first,
-        .low,
-        .high
+        .low    (coming_low),
+        .high   (coming_high)
     );
 
-    assign stores       = ready ? put && !low : !hold;
-    assign stored_at    = ready ? address : {3'd0, count[10:0]};
-    assign stored_value = ready ? stored_bits : first;
+    assign stores = ready ? put && !low : fill;
 
-    wire         store = !ready || commit || (put && !low);
+    wire          store = !ready || commit || (put && !low);
     // of a write and of a read: one port, since a low word is not stored while another is read
-    wire [W-1:0] used_place = commit ? low_place : place;
-    wire [ 31:0] stored = !ready ? first : commit ? wdata_low : stored_bits;
+    wire  [W-1:0] used_place = commit ? low_place : place;
+    wire  [ 31:0] stored = commit ? wdata_low : stored_value;
 
+    (* ram_style = STYLE *)logic [ 31:0] memory                                     [0:2**W-1];
     always_ff @(posedge clk) begin
         if (store) memory[used_place] <= stored;
         else if (select && !write) rdata <= memory[used_place];
     end
 
     always_ff @(posedge clk) begin
-        if (!ready && !hold) count <= count + 12'd1;
+        if (rst || ready || fill) begin
+            place        <= coming_place;
+            low          <= coming_low;
+            high         <= coming_high;
+            stored_at    <= coming;
+            stored_value <= begins ? stored_bits : first;
+        end
+        if (fill) begin
+            next  <= next + 1'b1;
+            ready <= next[11];
+        end
         if (put && low) wdata_low <= wdata;
         commit    <= put && high;
         low_place <= {place[W-1:1], 1'b0};
         if (rst) begin
-            count  <= '0;
+            next   <= 12'd1;
+            ready  <= 1'b0;
             commit <= 1'b0;
             wdata_low <= '0;
         end
@@ -152,13 +166,40 @@ module register_memory #(
         .low        (observed_low),
         .high       (observed_high)
     );
-    wire filled = ready || count[10:0] > observed[10:0];
+    wire [W-1:0] held_place;  // of the word at stored_at
+    wire [ 31:0] held_first;
+    register_layout #(
+        .AXES             (AXES),
+        .FILTERS          (FILTERS),
+        .HAS_BRIDGE       (HAS_BRIDGE),
+        .HAS_COMPARE      (HAS_COMPARE),
+        .HAS_DAC          (HAS_DAC),
+        .HAS_DRIVE        (HAS_DRIVE),
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
+        .HAS_HARMONICS    (HAS_HARMONICS),
+        .HAS_MONITOR      (HAS_MONITOR),
+        .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SINE         (HAS_SINE),
+        .HAS_STEPPER      (HAS_STEPPER),
+        .HAS_VELOCITY     (HAS_VELOCITY)
+    ) u_held (
+        .address    (stored_at),
+        .wdata,
+        .place      (held_place),
+        .stored_bits(),
+        .first      (held_first),
+        .low        (),
+        .high       ()
+    );
+    wire filled = ready || stored_at > observed;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         assume (observed < 14'd2048);
         assume (!select || (ready && !commit));
-        if (!ready && count[10:0] == observed[10:0]) value <= observed_first;
+        if (past && select) assume ($past(ready) && $stable(address) && $stable(wdata));
+        if (!ready && stored_at == observed) value <= observed_first;
         if (put && address == observed && !observed_low) value <= observed_bits;
         if (pending) value <= wdata_low;
         pending <= !rst && observed_low && high && put && address == {observed[13:1], 1'b1};
@@ -168,13 +209,15 @@ module register_memory #(
         end
         if (rst || !past) fetched <= 1'b0;
         if (past) begin
-            assert (count <= 12'd2048);
+            if (!ready && !$past(rst)) assert (next == stored_at[11:0] + 1'b1);
+            if (!ready) assert (next != '0 && next <= 12'd2048 && stored_at < 14'd2048);
+            if (!ready) assert (place == held_place && stored_value == held_first);
             if (filled && !rst) assert (memory[observed_place] == value);
             assert (pending == (commit && observed_low && low_place == observed_place));
             if (commit) assert (ready && (observed_low || low_place != observed_place));
             if (filled && &observed_place[W-1:6]) assert (value == 0);
             if (fetched) assert (rdata == fetched_value);
-            cover (count == 12'd1 && filled);
+            cover (next == 12'd2 && filled);
         end
     end
     wire unused = &{1'b0, observed_high};

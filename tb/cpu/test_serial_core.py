@@ -69,7 +69,7 @@ async def every_instruction_and_access_width_has_the_right_result(dut):
 
 
 @cocotb.test()
-async def latency_is_1_wait_cycle_for_memory_and_2_for_a_register(dut):
+async def latency_is_1_wait_cycle_for_memory_and_3_for_a_register(dut):
     """An operation takes 36 to 38 cycles, and all others 66 to 110."""
     registers = await begin(dut)
     waited, times, cycles, last = {}, [], None, 0
@@ -88,7 +88,7 @@ async def latency_is_1_wait_cycle_for_memory_and_2_for_a_register(dut):
             cycles = 0
         elif cycles is not None:
             cycles += 1
-    assert waited == {"memory": {1}, "register": {2}}
+    assert waited == {"memory": {1}, "register": {3}}
     short, long = ({t for t in times[1:] if (t < 60) == less} for less in (True, False))
     assert short and short <= {36, 37, 38} and 66 <= min(long) and max(long) <= 110
 

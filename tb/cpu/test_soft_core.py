@@ -154,6 +154,7 @@ async def every_word_that_the_core_takes_is_the_one_in_the_memory(dut):
         if int(core.mem_la_read.value) or int(core.mem_la_write.value):
             assert ready or not valid
         access = [int(x.value) for x in (core.mem_addr, core.mem_instr, core.mem_wstrb)]
+        access.append(str(core.mem_wdata.value))  # it has no value before the first write
         assert kept is None or (valid and access == kept)
         if valid and kept is None and kind(core) == "read":
             assert access[0] // 4 == operand // 4

@@ -58,16 +58,19 @@ class Bus:
         if self.known:
             assert int(dut.rdata.value) == model.rdata, f"word {address:#x}"
 
+    async def access(self, write, address, wdata=0, rst=0):
+        """The cycle in which address and wdata come, and the access."""
+        await self.clk(0, random.getrandbits(1), address, wdata)
+        await self.clk(1, write, address, wdata, rst)
+
     async def read(self, address):
-        await self.clk(1, 0, address)
+        await self.access(0, address)
         return int(self.dut.rdata.value)
 
     async def write(self, address, wdata):
-        """A write, and the cycle that must follow it."""
-        await self.clk(1, 1, address, wdata)
+        await self.access(1, address, wdata)
         if self.model.layout.low(address):
             assert int(self.dut.wdata_low.value) == wdata
-        await self.clk()
 
     async def write_wide(self, address, value):
         await self.write(address, value & WORD)
@@ -100,7 +103,7 @@ async def latency_is_1_from_an_access_to_rdata_and_wdata_low(dut):
     bus = await Bus(dut).begin()
     await bus.write(KP, 0x12_3456)
     assert await bus.read(KP) == 0x12_3456
-    await bus.clk(1, 1, STEP_RATIO, 0x89AB_CDEF)
+    await bus.access(1, STEP_RATIO, 0x89AB_CDEF)
     assert int(dut.wdata_low.value) == 0x89AB_CDEF
 
 
@@ -170,7 +173,6 @@ async def any_access_every_2_cycles_matches_the_model(dut):
             await bus.write(address, random.getrandbits(32))
         else:
             await bus.read(address)
-            await bus.clk()
 
 
 @cocotb.test()
@@ -178,7 +180,7 @@ async def a_reset_between_the_two_words_leaves_first_values(dut):
     bus = await Bus(dut).begin()
     await bus.write_wide(SEGMENT_VELOCITY, 7 << 32 | 8)
     await bus.write(SEGMENT_VELOCITY, 9)
-    await bus.clk(1, 1, SEGMENT_VELOCITY + 1, 10, rst=1)
+    await bus.access(1, SEGMENT_VELOCITY + 1, 10, rst=1)
     await bus.fill()
     assert [await bus.read(SEGMENT_VELOCITY + n) for n in (0, 1)] == [0, 0]
 

@@ -43,7 +43,8 @@ class Bus:
         self.wide = [
             r.word + 1 for r in self.block.registers if r.wide and r.fields[0].kind == "setting"
         ]
-        self.stored = False  # a high word was written in the cycle before
+        self.shown = None  # word and wdata of the clk before
+        self.stored = False  # a high word was written in it
         self.width = {f.port: f.width if f.kind == "input" else 1 for r, f in self.block.fields}
 
     async def begin(self):
@@ -70,13 +71,12 @@ class Bus:
         return [(r, f) for r, f in self.block.fields if f.kind in kinds and self.there[f]]
 
     async def clk(self, select=0, write=0, word=0, wdata=0, rst=0, **inputs):
-        """Inputs named here stand for this clk only. The memory wants a clk without an access after
-        the write of a high word.
+        """Inputs named here stand for this clk only. The memory wants word and wdata one clk before
+        an access, and a clk without one after the write of a high word.
         """
-        if self.stored and select:
-            self.stored = False
-            await self.clk()
-        self.stored = select and write and word in self.wide
+        if select and (self.shown != (word, wdata) or self.stored):
+            await self.clk(word=word, wdata=wdata)
+        self.shown, self.stored = (word, wdata), select and write and word in self.wide
         now = self.inputs | inputs
         for name, level in [
             *self.pins(now).items(),
