@@ -66,8 +66,6 @@ PICORV32 = {  # the options of soft_core.sv, and what is changed of them
     "ENABLE_COUNTERS": 0,
     "ENABLE_COUNTERS64": 0,
     "BARREL_SHIFTER": 1,
-    "ENABLE_MUL": 1,
-    "ENABLE_FAST_MUL": 1,
 }
 CHANGES: Mapping[str, Mapping[str, int]] = {
     "as it is": {},
@@ -75,8 +73,8 @@ CHANGES: Mapping[str, Mapping[str, int]] = {
     "with its own divider": {"ENABLE_DIV": 1},
     "with registers that begin at 0": {"REGS_INIT_ZERO": 1},
     "without the barrel shifter": {"BARREL_SHIFTER": 0},
-    "without products": {"ENABLE_MUL": 0, "ENABLE_FAST_MUL": 0},
-    "with products bit by bit": {"ENABLE_FAST_MUL": 0},
+    "with its own multiplier": {"ENABLE_MUL": 1, "ENABLE_FAST_MUL": 1},
+    "with products bit by bit": {"ENABLE_MUL": 1},
     "with comparisons in two cycles": {"TWO_CYCLE_COMPARE": 1},
     "with sums in two cycles": {"TWO_CYCLE_COMPARE": 1, "TWO_CYCLE_ALU": 1},
     "without the check of alignment": {"CATCH_MISALIGN": 0},
