@@ -43,6 +43,7 @@ module arctan_quotient #(
     wire  [       15:0] smaller = steep ? cos : sin;
 
     logic [LATENCY-1:0] coming;  // the sample is that many cycles old, less one
+    wire                works = !SERIAL || valid || coming != '0;  // else the registers rest
 
     // The state of the division after n pairs of digits. If SERIAL, it is one state for all n.
     for (genvar n = 0; n <= PAIRS; n++) begin : g_step
@@ -85,8 +86,10 @@ module arctan_quotient #(
             end
         end else if (n == 0) begin : g_one
             always_ff @(posedge clk) begin
-                remainder <= valid ? {smaller[15], smaller} : next_remainder;
-                tail      <= next_tail;
+                if (works) begin
+                    remainder <= valid ? {smaller[15], smaller} : next_remainder;
+                    tail      <= next_tail;
+                end
                 if (coming[2:0] != '0) head <= next_head;
                 if (valid) begin
                     divisor  <= larger;
@@ -157,16 +160,18 @@ module arctan_quotient #(
     wire [15:0] octant = 16'(({1'b0, base} + 20'(rise >>> 15)) >> 6);
 
     always_ff @(posedge clk) begin
-        coming  <= {coming[LATENCY-2:0], valid};
-        base    <= base_now;
-        slope   <= slope_now;
-        bend    <= bend_now;
-        bent    <= $signed({1'b0, bend}) * near;
-        tangent <= $signed({1'b0, slope}) - 17'(bent >>> 8);
-        rise    <= tangent * along;
-        quarter <= {g_step[9].divisor[15], g_step[9].steep_q};
-        falls   <= g_step[9].steep_q ^ g_step[9].negative;
-        zero    <= g_step[9].divisor == '0;
+        coming <= {coming[LATENCY-2:0], valid};
+        if (works) begin
+            base    <= base_now;
+            slope   <= slope_now;
+            bend    <= bend_now;
+            bent    <= $signed({1'b0, bend}) * near;
+            tangent <= $signed({1'b0, slope}) - 17'(bent >>> 8);
+            rise    <= tangent * along;
+            quarter <= {g_step[9].divisor[15], g_step[9].steep_q};
+            falls   <= g_step[9].steep_q ^ g_step[9].negative;
+            zero    <= g_step[9].divisor == '0;
+        end
         if (coming[LATENCY-2]) begin
             phase <= 16'(({quarter, 14'd0, 1'b1} + {octant ^ {16{falls}}, falls}) >> 1);
             if (zero) phase <= '0;

@@ -52,11 +52,13 @@ module event_filter #(
 
     // A number counted up from 0 contains all bits of another one for the first time when they are
     // equal. The comparison needs no adder, and the counters never overflow.
-    wire               sample = &(skipped | ~skip);
+    wire               due = &(skipped | ~skip);
+    wire  [LEVELS-1:0] active;  // a sample of the level can change something
+    wire               sample = due && active != '0;
 
     always_ff @(posedge clk) begin
         last <= required - W'(required != '0);
-        skipped <= sample ? '0 : skipped + 1'b1;
+        skipped <= due ? '0 : skipped + 1'b1;
         if (settling) settle <= settle - 1'b1;
         settling <= settle != '0 && settle != S'(1);
         if (rst) begin
@@ -74,13 +76,15 @@ module event_filter #(
         wire                    differs = level[i] ^ filtered[i];
         wire                    ripe = &(seen | ~last);
         wire                    over = &(against | ~tolerated);
-        wire                    ends = sample && (differs ? ripe : over);
+        wire                    ends = sample && active[i] && (differs ? ripe : over);
+
+        assign active[i] = differs || seen != '0;
 
         always_ff @(posedge clk) begin
-            rejected[i] <= !settling && ends && !differs && seen != '0;
+            rejected[i] <= !settling && ends && !differs;
             if (settling || (ends && differs)) filtered[i] <= level[i];
             if (sample && differs) seen <= seen + 1'b1;
-            if (sample && !differs && seen != '0) against <= against + 1'b1;
+            if (sample && !differs && active[i]) against <= against + 1'b1;
             if (settling || ends) begin
                 seen    <= '0;
                 against <= '0;
@@ -113,7 +117,7 @@ module event_filter #(
         past    <= 1'b1;
         needed_q <= required;
         if (rst || settling) history <= '0;
-        else if (sample) history <= g_level[0].differs && g_level[0].ripe ? '0 : now;
+        else if (due) history <= g_level[0].differs && g_level[0].ripe ? '0 : now;
         if (!past) assume (rst);
         // a new value acts on new disturbances only
         if (past && seen != 0) assume (tolerated == $past(tolerated));
