@@ -206,6 +206,7 @@ CONDITIONS = {"never": 0} | {
     for first, names in (
         (1, FLAGS),
         (16, PASSING),
+        (21, ("quiet",)),
         (24, ("negative", "loop", "due", "asked", "wrapped", "empty", "full", "filters")),
         (32, tuple(f"{name}_seen" for name in REQUESTS)),
         (39, ("stepped", "down", "block_up", "block_down", "closed", "lost", "lost_off")),
@@ -231,13 +232,14 @@ PROGRAM = """
                                         ; unless wrapped boot
                                         ; booted
 
-# between two ticks: write the setting that waits, serve the requests of one axis after the other
+# between two ticks: write the setting that waits, serve the requests of one axis after the other;
+# while there is nothing to do, the same line is fetched again and again, and no flip-flop changes
+scan:                                   ; next_axis
+rest:                                   ; if quiet rest
 idle:   setting -> setting              ; if due tick
                                         ; unless asked scan
                                         ; sample
                                         ; goto requests
-scan:                                   ; next_axis
-                                        ; goto idle
 
 # at the tick: serve one axis after the other
 tick:                                   ; set ticking

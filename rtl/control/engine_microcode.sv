@@ -72,12 +72,12 @@ module engine_microcode #(
         lines[34] = 36'h00007fc20;  // acc
         lines[35] = 36'h002e7fc20;  // ; unless wrapped boot
         lines[36] = 36'h0a407fc20;  // ; booted
-        lines[37] = 36'h0acd6fec0;  // idle: setting -> setting ; if due tick
-        lines[38] = 36'h0a6dffc20;  // ; unless asked scan
-        lines[39] = 36'h08c07fc20;  // ; sample
-        lines[40] = 36'h0ce07fc20;  // ; goto requests
-        lines[41] = 36'h08807fc20;  // scan: ; next_axis
-        lines[42] = 36'h09607fc20;  // ; goto idle
+        lines[37] = 36'h08807fc20;  // scan: ; next_axis
+        lines[38] = 36'h098affc20;  // rest: ; if quiet rest
+        lines[39] = 36'h0acd6fec0;  // idle: setting -> setting ; if due tick
+        lines[40] = 36'h096dffc20;  // ; unless asked scan
+        lines[41] = 36'h08c07fc20;  // ; sample
+        lines[42] = 36'h0ce07fc20;  // ; goto requests
         lines[43] = 36'h14007fc20;  // tick: ; set ticking
         lines[44] = 36'h08407fc20;  // ; first_axis
         lines[45] = 36'h00006fec0;  // axis: setting -> setting
@@ -143,7 +143,7 @@ module engine_microcode #(
         lines[105] = 36'h00007fc20;  // unstopped: acc
         lines[106] = 36'h00007fc20;  // acc
         lines[107] = 36'h200009e40;  // flags -> context ; give state
-        lines[108] = 36'h0a607fc20;  // ; goto scan
+        lines[108] = 36'h09607fc20;  // ; goto scan
         lines[109] = 36'h00007ee88;  // measure: byte ; y
         lines[110] = 36'h00007fd40;  // position
         lines[111] = 36'h00007e6b5;  // acc - last_position ; x
@@ -671,7 +671,7 @@ module engine_microcode #(
         lines[633] = 36'h00007fc20;  // acc
         lines[634] = 36'h0b6e7fc20;  // ; unless wrapped axis
         lines[635] = 36'h09407fc20;  // ; finished
-        lines[636] = 36'h09607fc20;  // ; goto idle
+        lines[636] = 36'h09e07fc20;  // ; goto idle
         for (int n = 637; n < 1024; n++) lines[n] = '0;
     end
 

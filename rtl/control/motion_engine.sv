@@ -32,7 +32,7 @@
 //           period (flag: above following_limit), 5 command (flag: at its limit), 6 target in 2^-16
 //           motor step (flag: restart there), 7 underrun.
 //           A setting is written within 100 cycles between two ticks, and before the next axis is
-//           served during a tick.
+//           served during a tick. While there is nothing to do, the program stays at one line.
 // limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units:
 //           gains 2^-16 command/LSB (ki and ka 2^-24), output_limit 2^-16 command, integral_limit
 //           2^-24 command, coefficients 2^-32, stop_deceleration 2^-40 period/tick2, trim_scale
@@ -122,6 +122,7 @@ module motion_engine #(
     logic [ 4:0] queued;  // segments in the queue
     logic [ 2:0] filter;
     logic        negative;
+    logic        quiet;  // no tick is served, no setting waits, no axis has a request
     // what is seen of this axis
     logic [47:0] axis_position;
     logic [23:0] axis_elapsed;
@@ -182,7 +183,8 @@ module motion_engine #(
             axis_asked,
             2'd0,
             negative,
-            3'd0,
+            2'd0,
+            quiet,
             flags
         }),
         .code,
@@ -362,6 +364,8 @@ module motion_engine #(
             seen_now <= now;
         end else if (elapsed != '1) elapsed <= elapsed + 1'b1;
 
+        quiet <= !busy && !setting_waits && waits == '0;
+
         // the setting that waits
         setting_waits <= setting_write || (setting_waits && !writes_setting);
 
@@ -369,7 +373,7 @@ module motion_engine #(
             source <= '0;
             {word, word_e} <= '1;
             {effect, effect_e} <= '0;
-            {filter, flags, period, ready, result_valid, setting_waits} <= '0;
+            {filter, flags, period, quiet, ready, result_valid, setting_waits} <= '0;
             elapsed <= 24'd1;
         end
     end

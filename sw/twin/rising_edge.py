@@ -35,19 +35,28 @@ CALL = re.compile(rf"{ROOT}___(\w+)\(vlSelf\);")
 RESET = re.compile(r"\(IData\)\(vlSelfRef\.rst\)|vlSelfRef\.rst\b")
 NEVER = "0U"  # its level
 # Whether the soft core waits; then most of the design does nothing, but for what changes by itself:
-# counters, the engine, and the way of a sample from the converter to the position. A register that
-# is missing here costs time only; tb/twin/test_rising_edge.py sees it.
+# counters, the engine, and the way of a sample from the converter to the position. While there is
+# nothing to do for the engine, it does nothing either. A register that is missing here costs time
+# only; tb/twin/test_rising_edge.py sees it.
 CORE = "vlSelfRef.node__DOT__g_core__DOT__u_core__DOT__"
 WAITS = f"vlSelfRef.node__DOT__core_waits & {CORE}mem_valid & {CORE}mem_addr >> 31"
 SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
-WORKS = re.compile(
-    r"^(?:node__DOT__)?now$|(?:^|__DOT__)(?:u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|"
-    r"u_core_wait__\w+|u_engine__DOT__(?!u_settings)\w+|u_lines__\w+|u_chain__\w+|"
-    r"u_monitor__\w+|u_adc__\w+|u_recorder__\w+|u_position__\w+|"
-    r"u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|"
-    r"raw_sin|raw_cos|plain_phase|age|since|tick|limit_tick|sample_tick|due|scale_valid|stepped|"
-    r"counted|strobe|result|result_\w+)$"
-)
+ENGINE = r"u_engine__DOT__(?!u_settings)\w+|result|result_\w+"
+FETCHED = re.compile(r"__DOT__u_sequencer__DOT__next_line$")  # it stays while the engine rests
+
+
+def works(*names: str) -> re.Pattern[str]:
+    """The registers that change although the soft core waits, with those of these names."""
+    return re.compile(
+        r"^(?:node__DOT__)?now$|(?:^|__DOT__)(?:u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|"
+        r"u_core_wait__\w+|u_engine__DOT__elapsed|u_lines__\w+|u_chain__\w+|"
+        r"u_monitor__\w+|u_adc__\w+|u_recorder__\w+|u_position__\w+|"
+        r"u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|"
+        r"raw_sin|raw_cos|plain_phase|age|since|tick|limit_tick|sample_tick|due|scale_valid|"
+        rf"stepped|counted|strobe{''.join(f'|{name}' for name in names)})$"
+    )
+
+
 PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
 
 Names = frozenset[str]
@@ -450,14 +459,16 @@ class Sinker:
 
 @dataclass
 class Rest:
-    """The part of a program that does nothing while the soft core waits. Its inputs are what the
-    other part computes and it needs. An edge at which no input changes, after one that has left
-    the inputs and all of its registers as they were, leaves them as they are again.
+    """The part of a program that does nothing for a while; `active` are the names of the signals
+    that change nevertheless. Its inputs are what the other part computes and it needs. An edge at
+    which no input changes, after one that has left the inputs and all of its registers as they
+    were, leaves them as they are again.
     """
 
     design: Design
     program: Sequence[Statement]
     logic: int  # statements at the beginning that are logic
+    active: re.Pattern[str]
     state: set[str] = field(init=False)  # what lasts
     works: set[int] = field(init=False)  # statements of the other part
 
@@ -469,7 +480,7 @@ class Rest:
             array(name)
             for effect in effects
             for name in effect.needs | effect.changes
-            if WORKS.search(name)
+            if self.active.search(name)
         }
         units = list(self.units())
         count = -1
@@ -594,7 +605,8 @@ def flagged(text: str, arrays: set[str], flag: str) -> str:
 def differs(kind: str, a: str, b: str) -> str:
     """An expression that is not 0 if two signals of a type differ."""
     if kind.startswith("VlWide"):
-        return f"!!std::memcmp(&{a}, &{b}, sizeof {a})"
+        words = range(int(kind[7 : kind.index(">")]))
+        return f"!!({' | '.join(f'({a}[{n}] ^ {b}[{n}])' for n in words)})"
     return f"({a} != {b})"
 
 
@@ -603,74 +615,153 @@ def any_of(conditions: Iterable[str]) -> str:
     return " |\n".join(conditions) or "0"
 
 
+@dataclass
+class Edges:
+    """The functions of a rising edge. Number 0 evaluates the whole program; each further one leaves
+    out more, a Rest of the program of the one before, and refuses if an input of what it leaves out
+    has changed.
+    """
+
+    design: Design
+    program: Sequence[Statement]
+    logic: int  # statements at the beginning that are logic
+    active: Sequence[re.Pattern[str]]  # what changes at each edge from 1 on
+    programs: list[list[Statement]] = field(init=False)
+    rests: list[Rest] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.programs, self.rests = [list(self.program)], []
+        logic = self.logic
+        for active in self.active:
+            rest = Rest(self.design, self.programs[-1], logic, active)
+            self.rests.append(rest)
+            self.programs.append([rest.program[n] for n in sorted(rest.works)])
+            logic = sum(n < logic for n in rest.works)
+        changes = effect_of(self.program).changes
+        self.types = {**self.design.locals, **self.design.types}
+        self.arrays = {array(name) for name in changes} - set(self.types) - self.design.outputs
+        # logic that one edge leaves as it was and uses
+        self.results = {name for rest in self.rests for name in rest.results}
+        self.stored = self.results & set(self.design.locals)
+
+    def before(self, n: int) -> list[str]:
+        """Registers and pins of which Rest n has a copy from before the last edge."""
+        rest = self.rests[n]
+        return sorted(rest.registers | rest.inputs & self.design.pins)
+
+    def changed(self, names: Iterable[str], now: str, then: str) -> str:
+        """An expression that is not 0 if one of the signals is not what it was. In the patterns, @
+        stands for its name.
+        """
+        return any_of(
+            differs(self.types.get(name, ""), now.replace("@", name), then.replace("@", name))
+            for name in names
+        )
+
+    def members(self) -> Iterator[str]:
+        """What is remembered from one edge to the next."""
+        for name in sorted(self.stored):
+            yield f"{self.types[name]} {name};"
+        for n, rest in enumerate(self.rests):
+            yield f"bool known_{n} = false;"  # nothing but the inputs can change what rests
+            yield f"bool written_{n} = false;"  # a memory of what rests was written
+            yield from (f"decltype({ROOT}::{name}) before_{n}_{name};" for name in self.before(n))
+            yield from (f"{self.types[name]} input_{n}_{name};" for name in rest.logic_inputs)
+
+    def after_logic(self, number: int) -> Plain:
+        """Refuses, or stores the logic inputs of what rests."""
+        computed = {array(name) for name in effect_of(self.programs[number]).changes}
+        names: set[str] = set()
+        lines = []
+        for n, rest in enumerate(self.rests):
+            inputs = rest.logic_inputs & computed
+            names |= inputs
+            if n < number and inputs:
+                differ = self.changed(sorted(inputs), "@", f"rest.input_{n}_@")
+                lines.append(f"if ({differ}) return false;")
+            elif n >= number:
+                lines += [f"rest.input_{n}_{name} = {name};" for name in sorted(inputs)]
+        words = {name for s in self.programs[number] for name in s.effect.changes}
+        needs = frozenset(name for name in words if array(name) in names)
+        return Plain(tuple(lines), Effect(needs, changes=frozenset(["return"])))
+
+    def text(self, number: int) -> Iterator[str]:
+        """The function of an edge, which returns false, before it has changed anything, if it
+        refuses.
+        """
+        program = self.programs[number]
+        computed = {array(name) for name in effect_of(program).changes}
+        # inlined where it is called, GCC keeps too much of it in memory: it takes half again as long
+        yield "__attribute__((noinline))"
+        yield f"static bool edge_{number}({ROOT}& vlSelfRef, Rest& rest) {{"
+        for n, rest in enumerate(self.rests[:number]):
+            names = rest.inputs & set(self.before(n)) & (computed | self.design.pins)
+            differ = self.changed(sorted(names), "vlSelfRef.@", f"rest.before_{n}_@")
+            yield f"if ({differ}) return false;"
+        logic = self.logic
+        for rest in self.rests[:number]:
+            logic = sum(n < logic for n in rest.works)
+        state = {array(name) for name in effect_of(self.program).needs}
+        kept = state | self.design.outputs | self.results
+        program = [*program[:logic], self.after_logic(number), *program[logic:]]
+        text = text_of(self.design, program, kept, self.stored)
+        for n, rest in enumerate(self.rests):
+            wakes = rest.inputs if n < number else set(rest.changes(False))
+            flag = f"rest.known_{n} = false;" if n < number else f"rest.written_{n} = true;"
+            text = flagged(text, self.arrays & wakes, flag)
+        yield from (text, "return true;", "}")
+
+    def observed(self, number: int) -> Iterator[str]:
+        """Statements that evaluate an edge and find out what may rest from the next one on."""
+        yield f"rest.written_{number} = false;"
+        before = self.before(number)
+        yield from (f"rest.before_{number}_{name} = vlSelfRef.{name};" for name in before)
+        yield f"if (edge_{number}(vlSelfRef, rest)) {{"
+        differ = self.changed(before, "vlSelfRef.@", f"rest.before_{number}_@")
+        yield f"rest.known_{number} = !(rest.written_{number} | {differ});"
+        yield "return;"
+        yield "}"
+
+
 def function(design: Design) -> str:
     """The C++ of `rising_edge`, which evaluates a design whose inputs are set and whose reset is
     low, and of the struct `Rest`, in which it remembers from one edge to the next what rests.
     """
     logic, flip_flops = logic_first(design)
     program = [*logic, *flip_flops]
-    whole = effect_of(program)
-    if late := whole.needs & design.of_inputs:
+    if late := effect_of(program).needs & design.of_inputs:
         raise FormError(f"logic of inputs stays behind: {', '.join(sorted(late))}")
     serial = any(name.startswith(SERIAL_CORE) for name in design.types)
     waits = NEVER if serial else WAITS
     if missing := set(re.findall(r"node__\w+", waits)) - set(design.types):
         raise FormError(f"there is no {', '.join(sorted(missing))}")
-    rest = Rest(design, program, len(logic))
-    types = {**design.locals, **design.types}
-    arrays = {array(name) for name in whole.changes} - set(types) - design.outputs
-    kept = rest.state | design.outputs | rest.results
-    stored = rest.results & set(design.locals)
-    before = sorted(rest.registers | rest.inputs & design.pins)
-
-    def changed_of(names: Iterable[str]) -> str:
-        return any_of(
-            differs(types.get(name, ""), f"vlSelfRef.{name}", f"rest.before_{name}")
-            for name in names
-        )
-
-    # all logic inputs are stored at a whole edge, and are variables at one that leaves out the rest
-    whole_edge = text_of(design, program, kept | rest.logic_inputs, stored | rest.logic_inputs)
-    logic_changed = any_of(
-        differs(types[name], name, f"rest.{name}") for name in sorted(rest.logic_inputs)
-    )
-    check = Plain(
-        (f"if ({logic_changed}) return false;",),
-        Effect(
-            frozenset(name for name in whole.changes if array(name) in rest.logic_inputs),
-            changes=frozenset(["return"]),
-        ),
-    )
-    working = [statement for n, statement in enumerate(program) if n in rest.works]
-    working.insert(sum(n < len(logic) for n in rest.works), check)
-    partial_edge = text_of(design, working, kept, stored)
-    lines = [
-        "struct Rest {",
-        "bool known = false;",  # nothing but the inputs can change what rests
-        "bool written = false;",  # a memory of what rests was written
-        *(f"{types[name]} {name};" for name in sorted(stored | rest.logic_inputs)),
-        *(f"decltype({ROOT}::{name}) before_{name};" for name in before),
-        "};",
-        # returns false, before it has changed anything, if an input of what rests has changed
-        f"static bool partial_edge({ROOT}& vlSelfRef, Rest& rest) {{",
-        f"if ({changed_of(sorted(rest.inputs & set(before)))}) return false;",
-        flagged(partial_edge, arrays & rest.inputs, "rest.known = false;"),
-        "return true;",
-        "}",
-        f"static void whole_edge({ROOT}& vlSelfRef, Rest& rest) {{",
-        flagged(whole_edge, arrays & set(rest.changes(False)), "rest.written = true;"),
-        "}",
-        f"static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{",
-        "if (rest.known && partial_edge(vlSelfRef, rest)) return;",
-        "rest.known = false;",
+    fetched = [name for name in design.types if FETCHED.search(name)]
+    edges = Edges(design, program, len(logic), [works(ENGINE), works()] if fetched else [works()])
+    lines = ["struct Rest {", *edges.members()]
+    lines += [f"decltype({ROOT}::{name}) last_{name};" for name in fetched]
+    lines.append("};")
+    for number in range(len(edges.programs)):
+        lines += edges.text(number)
+    lines.append(f"static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{")
+    if fetched:
+        line = fetched[0]
+        lines += [
+            "if (rest.known_0 & rest.known_1 && edge_2(vlSelfRef, rest)) return;",
+            "rest.known_1 = false;",
+            f"const bool stays = rest.last_{line} == vlSelfRef.{line};",
+            f"rest.last_{line} = vlSelfRef.{line};",
+            "if (rest.known_0 && stays) {",
+            *edges.observed(1),
+            "}",
+        ]
+    lines += [
+        "if (rest.known_0 && edge_1(vlSelfRef, rest)) return;",
+        "rest.known_0 = false;",
         f"if (!({waits})) {{",
-        "whole_edge(vlSelfRef, rest);",
+        "edge_0(vlSelfRef, rest);",
         "return;",
         "}",
-        "rest.written = false;",
-        *(f"rest.before_{name} = vlSelfRef.{name};" for name in before),
-        "whole_edge(vlSelfRef, rest);",
-        f"rest.known = !(rest.written | {changed_of(before)});",
+        *edges.observed(0),
         "}",
     ]
     return "\n".join(lines) + "\n"

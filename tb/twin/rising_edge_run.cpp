@@ -63,7 +63,7 @@ int main(int count, char** arguments) {
             MEMORIES(COMPARE)
         }
         driving += a.rs485_driver_enable;
-        rested += rest.known;
+        rested += rest.known_0;
     }
     std::printf("the same for %llu cycles; the node drove the bus in %llu, and rested in %llu\n",
                 (unsigned long long)cycles, (unsigned long long)driving,

@@ -133,7 +133,7 @@ BIT, WORD = "CData/*0:0*/", "IData/*31:0*/"
 def rest(*lines, logic=0, **types):
     """Of a program in which the signal `now` works, and which begins with logic."""
     program = rising_edge.Design(types, set(), set(), {}, frozenset(), frozenset(), parsed(*lines))
-    return rising_edge.Rest(program, program.program, logic)
+    return rising_edge.Rest(program, program.program, logic, re.compile("now"))
 
 
 def test_what_has_to_do_with_a_signal_that_works_works():
