@@ -691,7 +691,7 @@ class Edges:
         """
         program = self.programs[number]
         computed = {array(name) for name in effect_of(program).changes}
-        # inlined where it is called, GCC keeps too much of it in memory: it takes half again as long
+        # inlined where they are called, GCC makes code of them that takes 1.5 times as long
         yield "__attribute__((noinline))"
         yield f"static bool edge_{number}({ROOT}& vlSelfRef, Rest& rest) {{"
         for n, rest in enumerate(self.rests[:number]):
