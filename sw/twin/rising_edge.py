@@ -649,12 +649,16 @@ class Edges:
         rest = self.rests[n]
         return sorted(rest.registers | rest.inputs & self.design.pins)
 
-    def changed(self, names: Iterable[str], now: str, then: str) -> str:
-        """An expression that is not 0 if one of the signals is not what it was. In the patterns, @
-        stands for its name.
+    def now(self, name: str) -> str:
+        """A signal as Verilator's code names it."""
+        return name if name in self.design.locals else f"vlSelfRef.{name}"
+
+    def changed(self, names: Iterable[str], copy: str) -> str:
+        """An expression that is not 0 if one of the signals differs from its copy, in whose name @
+        stands for that of the signal.
         """
         return any_of(
-            differs(self.types.get(name, ""), now.replace("@", name), then.replace("@", name))
+            differs(self.types.get(name, ""), self.now(name), f"rest.{copy.replace('@', name)}")
             for name in names
         )
 
@@ -666,7 +670,8 @@ class Edges:
             yield f"bool known_{n} = false;"  # nothing but the inputs can change what rests
             yield f"bool written_{n} = false;"  # a memory of what rests was written
             yield from (f"decltype({ROOT}::{name}) before_{n}_{name};" for name in self.before(n))
-            yield from (f"{self.types[name]} input_{n}_{name};" for name in rest.logic_inputs)
+            inputs = sorted(rest.logic_inputs)
+            yield from (f"{self.types[name]} input_{n}_{name};" for name in inputs)
 
     def after_logic(self, number: int) -> Plain:
         """Refuses, or stores the logic inputs of what rests."""
@@ -677,10 +682,10 @@ class Edges:
             inputs = rest.logic_inputs & computed
             names |= inputs
             if n < number and inputs:
-                differ = self.changed(sorted(inputs), "@", f"rest.input_{n}_@")
+                differ = self.changed(sorted(inputs), f"input_{n}_@")
                 lines.append(f"if ({differ}) return false;")
             elif n >= number:
-                lines += [f"rest.input_{n}_{name} = {name};" for name in sorted(inputs)]
+                lines += [f"rest.input_{n}_{name} = {self.now(name)};" for name in sorted(inputs)]
         words = {name for s in self.programs[number] for name in s.effect.changes}
         needs = frozenset(name for name in words if array(name) in names)
         return Plain(tuple(lines), Effect(needs, changes=frozenset(["return"])))
@@ -696,7 +701,7 @@ class Edges:
         yield f"static bool edge_{number}({ROOT}& vlSelfRef, Rest& rest) {{"
         for n, rest in enumerate(self.rests[:number]):
             names = rest.inputs & set(self.before(n)) & (computed | self.design.pins)
-            differ = self.changed(sorted(names), "vlSelfRef.@", f"rest.before_{n}_@")
+            differ = self.changed(sorted(names), f"before_{n}_@")
             yield f"if ({differ}) return false;"
         logic = self.logic
         for rest in self.rests[:number]:
@@ -717,7 +722,7 @@ class Edges:
         before = self.before(number)
         yield from (f"rest.before_{number}_{name} = vlSelfRef.{name};" for name in before)
         yield f"if (edge_{number}(vlSelfRef, rest)) {{"
-        differ = self.changed(before, "vlSelfRef.@", f"rest.before_{number}_@")
+        differ = self.changed(before, f"before_{number}_@")
         yield f"rest.known_{number} = !(rest.written_{number} | {differ});"
         yield "return;"
         yield "}"

@@ -163,6 +163,37 @@ def test_results_and_registers_of_the_resting_part():
     assert split.works == {2} and split.results == {"x"} and split.registers == {"a"}
 
 
+def edges(*lines, logic, active, **types):
+    program = rising_edge.Design(types, set(), set(), {}, frozenset(), frozenset(), parsed(*lines))
+    return rising_edge.Edges(program, program.program, logic, [re.compile(x) for x in active])
+
+
+def test_each_edge_leaves_out_more():
+    split = edges("now = a;", "b = c;", "d = e;", logic=0, active=["now|b", "now"])
+    assert [text_of(program) for program in split.programs] == [
+        ["now = a;", "b = c;", "d = e;"],
+        ["now = a;", "b = c;"],
+        ["now = a;"],
+    ]
+
+
+def test_an_edge_refuses_if_an_input_of_what_it_leaves_out_has_changed():
+    lines = ("x = now;", "now = a;", "b = x;")
+    whole, part = (
+        "\n".join(edges(*lines, logic=1, active=["now"], now=WORD, b=WORD, x=BIT).text(number))
+        for number in (0, 1)
+    )
+    assert "rest.input_0_x = x;" in whole and "return false" not in whole
+    assert "if ((x != rest.input_0_x)) return false;" in part and "b = x" not in part
+
+
+def test_what_is_left_out_and_used_is_named_where_it_is_kept():
+    """x is an input of what the first edge leaves out, and computed by what only the second does."""
+    lines = ("x = b;", "now = x;", "c = x;", "b = a;")
+    split = edges(*lines, logic=1, active=["now|b", "now"], now=WORD, b=WORD, c=WORD, x=BIT)
+    assert split.results == {"x"} and "rest.input_0_x = vlSelfRef.x;" in "\n".join(split.text(0))
+
+
 def test_an_assignment_to_a_memory_sets_the_flag():
     text = "m[a] = b;\nc = m[a];\nVL_ASSIGN_W(m[a]);"
     assert rising_edge.flagged(text, {"m"}, "f") == "m[a] = b;\nf\nc = m[a];\nVL_ASSIGN_W(m[a]);\nf"
