@@ -188,7 +188,7 @@ def test_an_edge_refuses_if_an_input_of_what_it_leaves_out_has_changed():
 
 
 def test_what_is_left_out_and_used_is_named_where_it_is_kept():
-    """x is an input of what the first edge leaves out, and computed by what only the second does."""
+    """x is an input of what the first edge leaves out; the second one leaves out its logic."""
     lines = ("x = b;", "now = x;", "c = x;", "b = a;")
     split = edges(*lines, logic=1, active=["now|b", "now"], now=WORD, b=WORD, c=WORD, x=BIT)
     assert split.results == {"x"} and "rest.input_0_x = vlSelfRef.x;" in "\n".join(split.text(0))
