@@ -103,9 +103,10 @@ struct Bench {
     int64_t count_at(int64_t when) const { return counts[size_t(when % HISTORY)]; }
 
     void access(bool write, unsigned address, uint32_t data) {
-        while (!pins->ready) clk();
-        pins->select = 1, pins->write = write, pins->address = uint16_t(address),
-        pins->wdata = data;
+        pins->write = write, pins->address = uint16_t(address), pins->wdata = data;
+        do clk();
+        while (!pins->ready);
+        pins->select = 1;
         clk();
         pins->select = 0;
     }

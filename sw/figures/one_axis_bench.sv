@@ -5,41 +5,41 @@
 `default_nettype none
 
 module one_axis_bench (
-    input  wire         clk,
-    input  wire         rst,
+    input wire clk,
+    input wire rst,
     // register bus
-    input  wire         select,            // strobe: an access, while ready is high
-    input  wire         write,             // level: the access writes
-    input  wire  [15:0] address,           // byte address in the register map
-    input  wire  [31:0] wdata,             // value to write
-    output logic [31:0] rdata,             // live bits read, in the next cycle
-    output logic        ready,             // level: an access may come
+    input wire select,  // strobe: an access, while ready is high
+    input wire write,  // level: the access writes
+    input wire [15:0] address,  // byte address in the register map, from 1 cycle before select on
+    input wire [31:0] wdata,  // value to write, from 1 cycle before select on
+    output logic [31:0] rdata,  // live bits read, in the next cycle
+    output logic ready,  // level: an access may come
     // time
-    input  wire         tick,              // strobe: servo tick
-    input  wire  [23:0] tick_period,       // cycles
-    input  wire         sample_tick,       // strobe: take a sample
-    input  wire         limit_tick,        // strobe: an eighth of the time of a limit switch
-    input  wire  [31:0] now,               // cycles
+    input wire tick,  // strobe: servo tick
+    input wire [23:0] tick_period,  // cycles
+    input wire sample_tick,  // strobe: take a sample
+    input wire limit_tick,  // strobe: an eighth of the time of a limit switch
+    input wire [31:0] now,  // cycles
     // node
-    input  wire         estop,             // level: 1 pressed
-    input  wire         watchdog_expired,  // level: the master of the bus is silent
-    input  wire         cpu_stopped,       // level: the soft core has stopped or hangs
-    input  wire         other_sample,      // strobe: a sample of the other converter
-    output logic        sample_valid,      // strobe: a sample of the axis
+    input wire estop,  // level: 1 pressed
+    input wire watchdog_expired,  // level: the master of the bus is silent
+    input wire cpu_stopped,  // level: the soft core has stopped or hangs
+    input wire other_sample,  // strobe: a sample of the other converter
+    output logic sample_valid,  // strobe: a sample of the axis
     // pins
-    input  wire         encoder_a,         // pin
-    input  wire         encoder_b,         // pin
-    input  wire         limit_low_open,    // pin, 1: pressed or wire cut
-    input  wire         limit_high_open,   // pin, 1: pressed or wire cut
-    input  wire         drive_fault_n,     // pin, 0: the drive reports a fault
-    output logic        bridge_a,          // pin
-    output logic        bridge_b,          // pin
-    output logic        step,              // pin
-    output logic        direction,         // pin
-    output logic        drive_enable,      // pin, 1: the drive may be on
-    output logic [47:0] target,            // 2^-16 period, of the engine
-    output logic [15:0] cycles,            // cycles that a tick needs at most
-    output logic [15:0] most_steps         // steps still to be made that stop the step generator
+    input wire encoder_a,  // pin
+    input wire encoder_b,  // pin
+    input wire limit_low_open,  // pin, 1: pressed or wire cut
+    input wire limit_high_open,  // pin, 1: pressed or wire cut
+    input wire drive_fault_n,  // pin, 0: the drive reports a fault
+    output logic bridge_a,  // pin
+    output logic bridge_b,  // pin
+    output logic step,  // pin
+    output logic direction,  // pin
+    output logic drive_enable,  // pin, 1: the drive may be on
+    output logic [47:0] target,  // 2^-16 period, of the engine
+    output logic [15:0] cycles,  // cycles that a tick needs at most
+    output logic [15:0] most_steps  // steps still to be made that stop the step generator
 );
     wire memory_ready, stores, hold, waits;
     wire [13:0] stored_at;

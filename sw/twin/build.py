@@ -24,7 +24,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from firmware import build as firmware_build
-from twin import netlist, rising_edge
+from twin import netlist, rising_edge, statements
 from twin.parameters import tables as parameters
 
 HERE = Path(__file__).resolve().parent
@@ -405,7 +405,7 @@ def verilate_node(
         )
     try:
         evaluation = rising_edge.function(rising_edge.Design.read(folder))
-    except rising_edge.FormError as error:
+    except statements.FormError as error:
         raise BuildError(
             f"Verilator's code is not as sw/twin/rising_edge.py expects: {error}"
         ) from error

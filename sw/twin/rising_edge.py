@@ -9,11 +9,12 @@ after each edge are the same, bit for bit; tb/twin/test_rising_edge.py compares 
 to Verilator's evaluation: in the function it is low.
 
 While the soft core waits, most of the node rests: its registers stay as they are until one of its
-inputs changes. Such an edge evaluates only the other part. Which part works is a list of names; a
+inputs changes. Such an edge evaluates only the other part; and of this part, while the motion
+engine waits for the next tick, only what is not the engine. Which part works is a list of names; a
 wrong list costs time, but the result is the same.
 
-Everything here works on the text that `verilator --no-decoration` makes: one statement a line,
-braces at the ends of lines.
+Everything here works on the text that `verilator --no-decoration` makes; twin/statements.py takes
+it apart.
 """
 
 import re
@@ -23,234 +24,53 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-ROOT = "Vnode___024root"  # Verilator's class of all signals of the node
-VALUE = r"(?:CData|SData|IData|QData|VlWide<\d+>)(?:/\*[\d:]+\*/)?"
-DECLARATION = re.compile(rf"({VALUE}) (\w+);")
-ASSIGNMENT = re.compile(r"(?:vlSelfRef\.)?([A-Za-z_]\w*)((?:\[.*?\])*?) = (.*);")
-ZERO = re.compile(r"VL_ZERO_W\(\d+, (?:vlSelfRef\.)?(\w+)\);")
-NAME = re.compile(
-    r"\b(?!(?:vlSelfRef|[CSIQ]Data|if|else|for|while|do)\b|VL_)([A-Za-z_]\w*)",
+from twin.statements import (
+    ASSIGNMENT,
+    DECLARATION,
+    NAME,
+    NEVER,
+    ZERO,
+    Effect,
+    FormError,
+    Names,
+    Parser,
+    Plain,
+    Sinker,
+    Statement,
+    array,
+    effect_of,
 )
+
+ROOT = "Vnode___024root"  # Verilator's class of all signals of the node
 CALL = re.compile(rf"{ROOT}___(\w+)\(vlSelf\);")
 RESET = re.compile(r"\(IData\)\(vlSelfRef\.rst\)|vlSelfRef\.rst\b")
-NEVER = "0U"  # its level
-# Whether the soft core waits; then most of the design does nothing, but for what changes by itself:
-# counters, the engine, and the way of a sample from the converter to the position. While there is
-# nothing to do for the engine, it does nothing either. A register that is missing here costs time
-# only; tb/twin/test_rising_edge.py sees it.
+PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
 CORE = "vlSelfRef.node__DOT__g_core__DOT__u_core__DOT__"
 WAITS = f"vlSelfRef.node__DOT__core_waits & {CORE}mem_valid & {CORE}mem_addr >> 31"
 SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
+# What may change while the soft core waits: counters in any case; the motion engine until there is
+# nothing to do for it; the axes while they move, and for some cycles of each sample; the way of a
+# sample from a converter to the position. A register that is missing here costs time only;
+# tb/twin/test_rising_edge.py sees it.
+COUNTERS = (
+    r"u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|u_core_wait__\w+|u_engine__DOT__elapsed|"
+    r"u_lines__\w+|u_filter__DOT__(?:skipped|due)|since|tick|limit_tick|sample_tick"
+)
 ENGINE = r"u_engine__DOT__(?!u_settings)\w+|result|result_\w+"
+AXES = (
+    r"u_position__\w+|u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|plain_phase|age|due|"
+    r"scale_valid|stepped|counted|strobe"
+)
+SINE = r"u_chain__\w+|u_monitor__\w+|u_adc__\w+|u_recorder__\w+|raw_sin|raw_cos"
+ADC = re.compile(r"__DOT__u_adc__")  # in a node with a sine axis
 FETCHED = re.compile(r"__DOT__u_sequencer__DOT__next_line$")  # it stays while the engine rests
 
 
 def works(*names: str) -> re.Pattern[str]:
-    """The registers that change although the soft core waits, with those of these names."""
-    return re.compile(
-        r"^(?:node__DOT__)?now$|(?:^|__DOT__)(?:u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|"
-        r"u_core_wait__\w+|u_engine__DOT__elapsed|u_lines__\w+|u_chain__\w+|"
-        r"u_monitor__\w+|u_adc__\w+|u_recorder__\w+|u_position__\w+|"
-        r"u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|"
-        r"raw_sin|raw_cos|plain_phase|age|since|tick|limit_tick|sample_tick|due|scale_valid|"
-        rf"stepped|counted|strobe{''.join(f'|{name}' for name in names)})$"
-    )
-
-
-PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
-
-Names = frozenset[str]
-NONE: Names = frozenset()
-
-
-class FormError(Exception):
-    """Verilator's code has another form than this module expects."""
-
-
-@dataclass(frozen=True)
-class Effect:
-    """What a statement does to signals. `needs`: it uses the value from before; `sets`: it assigns
-    them in any case; `changes`: it may assign them.
+    """The registers that change although the soft core waits: counters, and those of these
+    names.
     """
-
-    needs: Names = NONE
-    sets: Names = NONE
-    changes: Names = NONE
-
-
-def effect_of(statements: Iterable["Statement"]) -> Effect:
-    """The effect of statements, one after the other."""
-    needs: set[str] = set()
-    sets: set[str] = set()
-    changes: set[str] = set()
-    for statement in statements:
-        needs |= statement.effect.needs - sets
-        sets |= statement.effect.sets
-        changes |= statement.effect.changes
-    return Effect(frozenset(needs), frozenset(sets), frozenset(changes))
-
-
-@dataclass(frozen=True, eq=False)
-class Plain:
-    """Statements of which nothing is known but their effect."""
-
-    text: tuple[str, ...]
-    effect: Effect
-
-    def lines(self) -> Iterator[str]:
-        """The text of it."""
-        yield from self.text
-
-
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Statements that stay together."""
-
-    statements: tuple["Statement", ...]
-
-    @cached_property
-    def effect(self) -> Effect:
-        """Of all."""
-        return effect_of(self.statements)
-
-    def lines(self) -> Iterator[str]:
-        """The text of it."""
-        for statement in self.statements:
-            yield from statement.lines()
-
-
-@dataclass(frozen=True, eq=False)
-class Choice:
-    """if (condition) {yes} else {no}"""
-
-    condition: str
-    asks: Names
-    yes: tuple["Statement", ...]
-    no: tuple["Statement", ...]
-
-    @cached_property
-    def branches(self) -> tuple[Effect, Effect]:
-        """The effects of both."""
-        return effect_of(self.yes), effect_of(self.no)
-
-    @cached_property
-    def effect(self) -> Effect:
-        """What only one branch assigns keeps its value in the other."""
-        yes, no = self.branches
-        sets, changes = yes.sets & no.sets, yes.changes | no.changes
-        return Effect(self.asks | yes.needs | no.needs | (changes - sets), sets, changes)
-
-    def lines(self) -> Iterator[str]:
-        """The text of it."""
-        yield f"if ({self.condition}) {{"
-        for statement in self.yes:
-            yield from statement.lines()
-        if self.no:
-            yield "} else {"
-            for statement in self.no:
-                yield from statement.lines()
-        yield "}"
-
-
-Statement = Plain | Group | Choice
-
-
-@dataclass
-class Parser:
-    """Statements of lines. words: {array of words that are only used one by one: how many}, whose
-    words are signals of their own, named as `signal[0]`.
-    """
-
-    lines: Sequence[str]
-    words: Mapping[str, int]
-    at: int = 0
-
-    def names(self, text: str) -> Names:
-        """The signals in an expression."""
-        found = set()
-        for match in NAME.finditer(text):
-            name = match.group(1)
-            count = self.words.get(name)
-            if count is None:
-                found.add(name)
-            elif index := re.match(r"\[(\d+)U\]", text[match.end() :]):
-                found.add(f"{name}[{index.group(1)}]")
-            else:
-                found |= {f"{name}[{n}]" for n in range(count)}
-        return frozenset(found)
-
-    def block(self) -> tuple[Statement, ...]:
-        """The statements to the end, or to the brace that closes the block."""
-        found = []
-        while self.at < len(self.lines) and not self.lines[self.at].startswith("}"):
-            found.append(self.statement())
-        return tuple(found)
-
-    def statement(self) -> Statement:
-        """The next one."""
-        line = self.lines[self.at]
-        if line.startswith("if (") and line.endswith(") {"):
-            return self.choice(line[4:-3])
-        if line.endswith("{"):
-            return self.unknown()
-        self.at += 1
-        if match := ZERO.fullmatch(line):
-            return Plain((line,), Effect(NONE, *[self.names(match.group(1))] * 2))
-        match = ASSIGNMENT.fullmatch(line)
-        if not match and line.startswith("VL_"):
-            names = self.names(line)
-            return Plain((line,), Effect(names, NONE, names))
-        if not match:
-            raise FormError(f"it has {line!r}")
-        name, index, value = match.groups()
-        needs = self.names(value)
-        if not index or (name in self.words and re.fullmatch(r"\[\d+U\]", index)):
-            target = self.names(name + index)
-            return Plain((line,), Effect(needs, target, target))
-        target = self.names(name)
-        return Plain((line,), Effect(needs | self.names(index) | target, NONE, target))
-
-    def choice(self, condition: str) -> Statement:
-        """An if, whose line is the next."""
-        self.at += 1
-        yes = self.block()
-        no: tuple[Statement, ...] = ()
-        line = self.end()
-        if line.startswith("} else if (") and line.endswith(") {"):
-            no = (self.choice(line[11:-3]),)
-            return self.chosen(condition, yes, no)
-        self.at += 1
-        if line == "} else {":
-            no = self.block()
-            line = self.end()
-            self.at += 1
-        if line != "}":
-            raise FormError(f"a block ends with {line!r}")
-        return self.chosen(condition, yes, no)
-
-    def chosen(
-        self, condition: str, yes: tuple[Statement, ...], no: tuple[Statement, ...]
-    ) -> Statement:
-        """A choice, without what is only for reset."""
-        if condition == NEVER:
-            return Group(no)
-        return Choice(condition, self.names(condition), yes, no)
-
-    def end(self) -> str:
-        """The line that ends a block."""
-        if self.at == len(self.lines):
-            raise FormError("a block does not end")
-        return self.lines[self.at]
-
-    def unknown(self) -> Plain:
-        """A loop or the like: it may read and change whatever it names."""
-        begin, depth = self.at, 0
-        while self.at == begin or depth:
-            depth += self.lines[self.at].count("{") - self.lines[self.at].count("}")
-            self.at += 1
-        text = tuple(self.lines[begin : self.at])
-        names = self.names("\n".join(text))
-        return Plain(text, Effect(names, NONE, names))
+    return re.compile(rf"^(?:node__DOT__)?now$|(?:^|__DOT__)(?:{'|'.join((COUNTERS, *names))})$")
 
 
 @dataclass
@@ -324,11 +144,6 @@ def triggered(code: str, name: str) -> list[str]:
     return lines[:begin] + lines[begin + 1 : -1]
 
 
-def array(name: str) -> str:
-    """The name of a signal without the number of a word."""
-    return name.partition("[")[0]
-
-
 def logic_first(design: Design) -> tuple[list[Statement], list[Statement]]:
     """The program of an edge in two parts: its logic, which goes to the beginning instead of the
     end, where it sees the inputs of the new cycle; and all that stays. A statement goes if no
@@ -362,99 +177,6 @@ def logic_first(design: Design) -> tuple[list[Statement], list[Statement]]:
             first = set(moved)
             stay = [s for n, s in enumerate(design.program) if n not in first]
             return [design.program[n] for n in moved], stay
-
-
-@dataclass
-class Sinker:
-    """Moves statements to where their results are needed. passing: the names of all signals that
-    only the statements of this list use.
-    """
-
-    passing: Names
-    block: list[Statement | None] = field(default_factory=list)
-    users: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
-    writers: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
-
-    def sunk(self, statements: Iterable[Statement]) -> tuple[Statement, ...]:
-        """The statements in their new places."""
-        self.block = list(statements)
-        for n in reversed(range(len(self.block))):
-            self.place(n)
-        return tuple(s for s in self.block if s)
-
-    def note(self, n: int, statement: Statement) -> None:
-        """Enter what a statement uses and changes."""
-        for name in statement.effect.needs:
-            self.users[name].add(n)
-        for name in statement.effect.changes:
-            self.writers[name].add(n)
-
-    def forget(self, n: int, statement: Statement) -> None:
-        """Undo note()."""
-        for name in statement.effect.needs:
-            self.users[name].discard(n)
-        for name in statement.effect.changes:
-            self.writers[name].discard(n)
-
-    def place(self, n: int) -> None:
-        """Move one statement; those behind it are in their places."""
-        statement = self.block[n]
-        assert statement
-        effect = statement.effect
-        users = {u for name in effect.changes for u in self.users[name]}
-        writers = {w for name in effect.changes for w in self.writers[name]}
-        if not all(array(name) in self.passing for name in effect.changes):
-            self.note(n, statement)
-            return
-        first = min(users | writers, default=n)
-        if not users or (first not in users and len(effect.changes) == 1):
-            self.block[n] = None  # it is not used, or computed again before any use
-            return
-        others = [self.block[u] for u in users]
-        if writers and users | writers != {first}:
-            self.join(n, first)
-        elif not self.between(effect.needs, n, max(users)) and all(
-            isinstance(other, Choice) and not other.asks & effect.changes for other in others
-        ):
-            for u in users:
-                self.sink(statement, u)
-            self.block[n] = None
-        else:
-            self.note(n, statement)
-
-    def join(self, n: int, m: int) -> None:
-        """Make one group of a value and its exception, which is m, and move that."""
-        value, exception = self.block[n], self.block[m]
-        assert value and exception
-        changes = exception.effect.changes
-        if (
-            value.effect.changes & exception.effect.needs & changes
-            and all(array(name) in self.passing for name in changes)
-            and not self.between(value.effect.needs, n, m)
-        ):
-            self.forget(m, exception)
-            self.block[m], self.block[n] = Group((value, exception)), None
-            self.place(m)
-        else:
-            self.note(n, value)
-
-    def sink(self, statement: Statement, n: int) -> None:
-        """Put a statement into those branches of a choice that need it."""
-        choice, changes = self.block[n], statement.effect.changes
-        assert isinstance(choice, Choice)
-        self.forget(n, choice)
-        results = frozenset(array(name) for name in changes)
-        yes, no = (
-            Sinker(results).sunk((statement, *branch)) if effect.needs & changes else branch
-            for branch, effect in zip((choice.yes, choice.no), choice.branches)
-        )
-        sunk = Choice(choice.condition, choice.asks, yes, no)
-        self.block[n] = sunk
-        self.note(n, sunk)
-
-    def between(self, names: Names, begin: int, end: int) -> bool:
-        """Whether a statement between two changes one of these signals."""
-        return any(begin < w < end for name in names for w in self.writers[name])
 
 
 @dataclass
@@ -716,6 +438,10 @@ class Edges:
             text = flagged(text, self.arrays & wakes, flag)
         yield from (text, "return true;", "}")
 
+    def known(self, number: int) -> str:
+        """Whether this edge may be evaluated."""
+        return " & ".join(f"rest.known_{n}" for n in range(number))
+
     def observed(self, number: int) -> Iterator[str]:
         """Statements that evaluate an edge and find out what may rest from the next one on."""
         yield f"rest.written_{number} = false;"
@@ -741,26 +467,38 @@ def function(design: Design) -> str:
     if missing := set(re.findall(r"node__\w+", waits)) - set(design.types):
         raise FormError(f"there is no {', '.join(sorted(missing))}")
     fetched = [name for name in design.types if FETCHED.search(name)]
-    edges = Edges(design, program, len(logic), [works(ENGINE), works()] if fetched else [works()])
+    if any(ADC.search(name) for name in design.types):
+        active = [works(ENGINE, AXES, SINE), works(AXES, SINE)]
+    else:
+        active = [works(ENGINE, AXES), works(ENGINE), works()]
+    if not fetched:
+        active.pop()  # there is no engine
+    edges = Edges(design, program, len(logic), active)
+    last = len(active)
     lines = ["struct Rest {", *edges.members()]
     lines += [f"decltype({ROOT}::{name}) last_{name};" for name in fetched]
     lines.append("};")
-    for number in range(len(edges.programs)):
+    for number in range(last + 1):
         lines += edges.text(number)
     lines.append(f"static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{")
-    if fetched:
-        line = fetched[0]
-        lines += [
-            "if (rest.known_0 & rest.known_1 && edge_2(vlSelfRef, rest)) return;",
-            "rest.known_1 = false;",
-            f"const bool stays = rest.last_{line} == vlSelfRef.{line};",
-            f"rest.last_{line} = vlSelfRef.{line};",
-            "if (rest.known_0 && stays) {",
-            *edges.observed(1),
-            "}",
-        ]
+    lines += [f"if ({edges.known(last)} && edge_{last}(vlSelfRef, rest)) return;"]
+    for number in reversed(range(1, last)):
+        lines += [f"rest.known_{number} = false;", f"if ({edges.known(number)}) {{"]
+        if number == last - 1 and fetched:
+            line = fetched[0]
+            lines += [
+                f"const bool stays = rest.last_{line} == vlSelfRef.{line};",
+                f"rest.last_{line} = vlSelfRef.{line};",
+                "if (!stays) {",
+                f"if (edge_{number}(vlSelfRef, rest)) return;",
+                "} else {",
+                *edges.observed(number),
+                "}",
+            ]
+        else:
+            lines += edges.observed(number)
+        lines.append("}")
     lines += [
-        "if (rest.known_0 && edge_1(vlSelfRef, rest)) return;",
         "rest.known_0 = false;",
         f"if (!({waits})) {{",
         "edge_0(vlSelfRef, rest);",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The function that evaluates a node at a rising edge: its rules one by one, and the whole against
+"""The functions that evaluate a node at a rising edge: what they leave out, and the whole against
 Verilator's own evaluation.
 """
 
@@ -11,94 +11,9 @@ from pathlib import Path
 import pytest
 
 from experiments import s2_stage
-from twin import build, rising_edge
+from tb.twin.test_statements import parsed, text_of
+from twin import build, rising_edge, statements
 from twin.nodes.twin import NODE
-
-
-def parsed(*lines, **words):
-    return rising_edge.Parser(lines, words).block()
-
-
-def text_of(statements):
-    return [line for statement in statements for line in statement.lines()]
-
-
-def sunk(*lines, passing="xyz"):
-    return text_of(rising_edge.Sinker(frozenset(passing)).sunk(parsed(*lines)))
-
-
-def test_what_only_one_branch_assigns_is_needed_from_before():
-    (statement,) = parsed("if (a) {", "x = b;", "} else {", "y = c;", "}")
-    assert statement.effect.needs == frozenset("abcxy") and not statement.effect.sets
-    assert statement.effect.changes == frozenset("xy")
-
-
-def test_what_both_branches_assign_is_set():
-    (statement,) = parsed(
-        "if (a) {", "x = b;", "} else if (c) {", "x = 0U;", "} else {", "x = d;", "}"
-    )
-    assert statement.effect.needs == frozenset("abcd") and statement.effect.sets == {"x"}
-
-
-def test_a_part_of_a_signal_keeps_the_rest():
-    (statement,) = parsed("x[a] = b;")
-    assert statement.effect.needs == frozenset("abx") and not statement.effect.sets
-
-
-def test_words_that_are_used_one_by_one_are_signals_of_their_own():
-    first, second = parsed("x[1U] = a;", "b = x[1U];", x=3)
-    assert first.effect.sets == {"x[1]"} and second.effect.needs == {"x[1]"}
-
-
-def test_a_loop_may_read_and_change_whatever_it_names():
-    (statement,) = parsed("while ((a < b)) {", "x = a;", "}")
-    assert statement.effect.needs == statement.effect.changes == frozenset("abx")
-
-
-def test_a_block_that_does_not_end_is_refused():
-    with pytest.raises(rising_edge.FormError, match="does not end"):
-        parsed("if (a) {", "x = b;")
-
-
-def test_what_one_branch_needs_is_computed_in_it():
-    assert sunk("x = a;", "if (b) {", "c = x;", "}") == ["if (b) {", "x = a;", "c = x;", "}"]
-
-
-def test_what_several_branches_need_is_computed_in_each():
-    assert sunk("x = a;", "if (b) {", "c = x;", "}", "if (d) {", "e = x;", "}") == [
-        *("if (b) {", "x = a;", "c = x;", "}"),
-        *("if (d) {", "x = a;", "e = x;", "}"),
-    ]
-
-
-def test_what_a_condition_needs_stays():
-    lines = ["x = a;", "if (x) {", "c = x;", "}"]
-    assert sunk(*lines) == lines
-
-
-def test_nothing_goes_past_a_change_of_what_it_uses():
-    lines = ["x = a;", "a = b;", "if (b) {", "c = x;", "}"]
-    assert sunk(*lines) == lines
-
-
-def test_a_signal_that_lasts_stays():
-    lines = ["f = a;", "if (b) {", "c = f;", "}"]
-    assert sunk(*lines) == lines
-
-
-def test_a_value_and_its_exception_go_together():
-    lines = ["x = a;", "if (b) {", "x = d;", "}", "if (c) {", "e = x;", "}"]
-    assert sunk(*lines) == ["if (c) {", "x = a;", "if (b) {", "x = d;", "}", "e = x;", "}"]
-
-
-def test_what_nobody_uses_is_left_out():
-    assert sunk("x = a;", "x = b;", "c = x;") == ["x = b;", "c = x;"]
-
-
-def test_the_other_statements_of_a_branch_stay():
-    """They may be needed behind it."""
-    lines = ["if (b) {", "y = d;", "c = x;", "}", "e = y;"]
-    assert sunk("x = a;", *lines) == ["if (b) {", "x = a;", "y = d;", "c = x;", "}", "e = y;"]
 
 
 def design(logic, *lines):
@@ -123,7 +38,7 @@ def test_logic_of_an_output_stays_behind_its_flip_flop():
 
 
 def test_logic_of_inputs_that_stays_behind_is_refused():
-    with pytest.raises(rising_edge.FormError, match="logic of inputs stays behind: i"):
+    with pytest.raises(statements.FormError, match="logic of inputs stays behind: i"):
         rising_edge.function(design("i", "a = i;", "f = a;"))
 
 
@@ -202,7 +117,7 @@ def test_an_assignment_to_a_memory_sets_the_flag():
 def test_code_without_the_function_is_refused(tmp_path):
     (tmp_path / f"{rising_edge.ROOT}__0.cpp").write_text("void nothing() {\n}\n")
     (tmp_path / f"{rising_edge.ROOT}.h").write_text("")
-    with pytest.raises(rising_edge.FormError, match="there is no function eval_nba"):
+    with pytest.raises(statements.FormError, match="there is no function eval_nba"):
         rising_edge.Design.read(tmp_path)
 
 
@@ -223,7 +138,7 @@ def test_a_variable_of_two_types_is_refused(tmp_path):
     text = FUNCTION.format(root=rising_edge.ROOT, name="eval_nba", lines="\n".join(lines))
     (tmp_path / f"{rising_edge.ROOT}__0.cpp").write_text(text)
     (tmp_path / f"{rising_edge.ROOT}.h").write_text("")
-    with pytest.raises(rising_edge.FormError, match="x has two types"):
+    with pytest.raises(statements.FormError, match="x has two types"):
         rising_edge.Design.read(tmp_path)
 
 
@@ -234,8 +149,8 @@ def signals(folder: Path) -> str:
     memories = set(re.findall(r"^VlUnpacked<.*> (\w+);$", header, re.M))
     design = rising_edge.Design.read(folder)
     logic, flip_flops = rising_edge.logic_first(design)
-    whole = rising_edge.effect_of([*logic, *flip_flops])
-    needs = {rising_edge.array(name) for name in whole.needs}
+    whole = statements.effect_of([*logic, *flip_flops])
+    needs = {statements.array(name) for name in whole.needs}
     lists = {
         "INPUTS": [f"{name}, {2 ** (int(top) + 1) - 1:#x}" for name, top in inputs],
         "REGISTERS": sorted(needs & set(design.types) | design.outputs),
