@@ -28,8 +28,12 @@ test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilato
 	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(NETLIST), on netlists for $(NETLIST))$(if $(SEED), with SEED=$(SEED)))
 	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' NETLIST='$(NETLIST)' POWER_UP='$(POWER_UP)' $(PYTHON) -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder $(if $K,-k '$K') tb
 
-check: fresh lint promises test prove quick  ## what every change must pass
+check: fresh lint proofs test quick  ## what every change must pass
 	@echo 'check: all passed'
+
+# what has one long part and many short ones, side by side
+proofs: $(SETUP)
+	@$(MAKE) -j$(JOBS) --output-sync=target promises prove
 
 promises: $(SETUP)  ## what the project promises of its code: units, latencies, imports, tests, types
 	$(call say,promises: columns; units of ports; latencies; imports; tests that can fail; strict types)
@@ -124,4 +128,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check lint types promises format prove tables fresh firmware figure quick figures soak board clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak board clean

@@ -234,7 +234,7 @@ FIGURES = {
         "a limit by more than rounding adds (8 of 2^-40 period); after an override acceleration "
         "and jerk may be 25 % higher",
         "0",
-        Quick({"moves": 1000}, "1000 moves"),
+        Quick({"moves": 500}, "500 moves"),
         0,
     ),
     "profile_time_ratio": Figure(
@@ -243,7 +243,7 @@ FIGURES = {
         "time over ruckig's optimum, worst of 20 000 moves from rest and as many new targets in "
         "flight; moves shorter than 0.1 s, which are most of them, are granted 4 ticks (1 ms) more",
         "<= 1.02",
-        Quick({"moves": 500}, "1000 moves"),
+        Quick({"moves": 250}, "500 moves"),
         4,
     ),
 }
