@@ -139,68 +139,50 @@ module register_memory #(
     logic        pending;  // its high word was written in the cycle before
     logic        fetched;  // rdata is its value
     logic [31:0] value, fetched_value;  // what it reads, what it was when it was read
-    wire [W-1:0] observed_place;
-    wire [31:0] observed_bits, observed_first;
-    wire observed_low, observed_high;
-    register_layout #(
-        .AXES             (AXES),
-        .FILTERS          (FILTERS),
-        .HAS_BRIDGE       (HAS_BRIDGE),
-        .HAS_COMPARE      (HAS_COMPARE),
-        .HAS_DAC          (HAS_DAC),
-        .HAS_DRIVE        (HAS_DRIVE),
-        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
-        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
-        .HAS_HARMONICS    (HAS_HARMONICS),
-        .HAS_MONITOR      (HAS_MONITOR),
-        .HAS_RECORDER     (HAS_RECORDER),
-        .HAS_SINE         (HAS_SINE),
-        .HAS_STEPPER      (HAS_STEPPER),
-        .HAS_VELOCITY     (HAS_VELOCITY)
-    ) u_observed (
-        .address    (observed),
-        .wdata,
-        .place      (observed_place),
-        .stored_bits(observed_bits),
-        .first      (observed_first),
-        .low        (observed_low),
-        .high       (observed_high)
-    );
-    wire [W-1:0] held_place;  // of the word at stored_at
-    wire [ 31:0] held_first;
-    register_layout #(
-        .AXES             (AXES),
-        .FILTERS          (FILTERS),
-        .HAS_BRIDGE       (HAS_BRIDGE),
-        .HAS_COMPARE      (HAS_COMPARE),
-        .HAS_DAC          (HAS_DAC),
-        .HAS_DRIVE        (HAS_DRIVE),
-        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
-        .HAS_FINE_STAGE   (HAS_FINE_STAGE),
-        .HAS_HARMONICS    (HAS_HARMONICS),
-        .HAS_MONITOR      (HAS_MONITOR),
-        .HAS_RECORDER     (HAS_RECORDER),
-        .HAS_SINE         (HAS_SINE),
-        .HAS_STEPPER      (HAS_STEPPER),
-        .HAS_VELOCITY     (HAS_VELOCITY)
-    ) u_held (
-        .address    (stored_at),
-        .wdata,
-        .place      (held_place),
-        .stored_bits(),
-        .first      (held_first),
-        .low        (),
-        .high       ()
-    );
-    wire filled = ready || stored_at > observed;
+    // of the observed word, and of the one at stored_at
+    wire [ 13:0] looked_at   [0:1];
+    wire [W-1:0] looked_place[0:1];
+    wire [31:0] looked_bits[0:1], looked_first[0:1];
+    wire [1:0] looked_low, looked_high;
+    assign looked_at[0] = observed;
+    assign looked_at[1] = stored_at;
+    for (genvar n = 0; n < 2; n++) begin : g_look
+        register_layout #(
+            .AXES             (AXES),
+            .FILTERS          (FILTERS),
+            .HAS_BRIDGE       (HAS_BRIDGE),
+            .HAS_COMPARE      (HAS_COMPARE),
+            .HAS_DAC          (HAS_DAC),
+            .HAS_DRIVE        (HAS_DRIVE),
+            .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+            .HAS_FINE_STAGE   (HAS_FINE_STAGE),
+            .HAS_HARMONICS    (HAS_HARMONICS),
+            .HAS_MONITOR      (HAS_MONITOR),
+            .HAS_RECORDER     (HAS_RECORDER),
+            .HAS_SINE         (HAS_SINE),
+            .HAS_STEPPER      (HAS_STEPPER),
+            .HAS_VELOCITY     (HAS_VELOCITY)
+        ) u_layout (
+            .address    (looked_at[n]),
+            .wdata,
+            .place      (looked_place[n]),
+            .stored_bits(looked_bits[n]),
+            .first      (looked_first[n]),
+            .low        (looked_low[n]),
+            .high       (looked_high[n])
+        );
+    end
+    wire [W-1:0] observed_place = looked_place[0];
+    wire         observed_low = looked_low[0];
+    wire         filled = ready || stored_at > observed;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         assume (observed < 14'd2048);
         assume (!select || (ready && !commit));
         if (past && select) assume ($past(ready) && $stable(address) && $stable(wdata));
-        if (!ready && stored_at == observed) value <= observed_first;
-        if (put && address == observed && !observed_low) value <= observed_bits;
+        if (!ready && stored_at == observed) value <= looked_first[0];
+        if (put && address == observed && !observed_low) value <= looked_bits[0];
         if (pending) value <= wdata_low;
         pending <= !rst && observed_low && high && put && address == {observed[13:1], 1'b1};
         if (select && !write) begin
@@ -211,7 +193,7 @@ module register_memory #(
         if (past) begin
             if (!ready && !$past(rst)) assert (next == stored_at[11:0] + 1'b1);
             if (!ready) assert (next != '0 && next <= 12'd2048 && stored_at < 14'd2048);
-            if (!ready) assert (place == held_place && stored_value == held_first);
+            if (!ready) assert (place == looked_place[1] && stored_value == looked_first[1]);
             if (filled && !rst) assert (memory[observed_place] == value);
             assert (pending == (commit && observed_low && low_place == observed_place));
             if (commit) assert (ready && (observed_low || low_place != observed_place));
@@ -220,7 +202,7 @@ module register_memory #(
             cover (next == 12'd2 && filled);
         end
     end
-    wire unused = &{1'b0, observed_high};
+    wire unused = &{1'b0, looked_low[1], looked_high, looked_bits[1]};
 `endif
 endmodule
 
