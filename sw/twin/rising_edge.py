@@ -54,7 +54,7 @@ SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
 # tb/twin/test_rising_edge.py sees it.
 COUNTERS = (
     r"u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|u_core_wait__\w+|u_engine__DOT__elapsed|"
-    r"u_lines__\w+|u_filter__DOT__(?:skipped|due)|since|tick|limit_tick|sample_tick"
+    r"u_lines__\w+|u_filter__DOT__(?:skipped|due)|since"
 )
 ENGINE = r"u_engine__DOT__(?!u_settings)\w+|result|result_\w+"
 AXES = (
