@@ -9,9 +9,9 @@ after each edge are the same, bit for bit; tb/twin/test_rising_edge.py compares 
 to Verilator's evaluation: in the function it is low.
 
 While the soft core waits, most of the node rests: its registers stay as they are until one of its
-inputs changes. Such an edge evaluates only the other part; and of this part, while the motion
-engine waits for the next tick, only what is not the engine. Which part works is a list of names; a
-wrong list costs time, but the result is the same.
+inputs changes. Such an edge evaluates only the other part; and of this part, only what is left
+while the axes stand still, and while the motion engine waits for the next tick. Which part works is
+a list of names; a wrong list costs time, but the result is the same.
 
 Everything here works on the text that `verilator --no-decoration` makes; twin/statements.py takes
 it apart.
@@ -349,16 +349,16 @@ class Edges:
     logic: int  # statements at the beginning that are logic
     active: Sequence[re.Pattern[str]]  # what changes at each edge from 1 on
     programs: list[list[Statement]] = field(init=False)
-    rests: list[Rest] = field(init=False)
+    rests: list[Rest] = field(init=False)  # what edge n + 1 leaves out of the program of edge n
+    logics: list[int] = field(init=False)  # as `logic`, of each program
 
     def __post_init__(self) -> None:
-        self.programs, self.rests = [list(self.program)], []
-        logic = self.logic
+        self.programs, self.rests, self.logics = [list(self.program)], [], [self.logic]
         for active in self.active:
-            rest = Rest(self.design, self.programs[-1], logic, active)
+            rest = Rest(self.design, self.programs[-1], self.logics[-1], active)
             self.rests.append(rest)
             self.programs.append([rest.program[n] for n in sorted(rest.works)])
-            logic = sum(n < logic for n in rest.works)
+            self.logics.append(sum(n < rest.logic for n in rest.works))
         changes = effect_of(self.program).changes
         self.types = {**self.design.locals, **self.design.types}
         self.arrays = {array(name) for name in changes} - set(self.types) - self.design.outputs
@@ -425,11 +425,9 @@ class Edges:
             names = rest.inputs & set(self.before(n)) & (computed | self.design.pins)
             differ = self.changed(sorted(names), f"before_{n}_@")
             yield f"if ({differ}) return false;"
-        logic = self.logic
-        for rest in self.rests[:number]:
-            logic = sum(n < logic for n in rest.works)
         state = {array(name) for name in effect_of(self.program).needs}
         kept = state | self.design.outputs | self.results
+        logic = self.logics[number]
         program = [*program[:logic], self.after_logic(number), *program[logic:]]
         text = text_of(self.design, program, kept, self.stored)
         for n, rest in enumerate(self.rests):

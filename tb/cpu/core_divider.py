@@ -5,7 +5,7 @@ result after it.
 
 DIVISION = 0b0110011 | 1 << 25 | 1 << 14  # what all four codes have in common
 DIV, DIVU, REM, REMU = (DIVISION | n << 12 for n in range(4))
-DISTINCTIVE = 0x7F | 0x7F << 25 | 1 << 14  # the bits that make an instruction a division
+DISTINCTIVE = 0x7F | 0x7F << 25 | 1 << 14  # the bits that tell a division or a product
 
 
 def is_division(instruction):

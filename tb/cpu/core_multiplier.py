@@ -3,9 +3,10 @@
 and result after it.
 """
 
-MULTIPLICATION = 0b0110011 | 1 << 25  # what all four codes have in common
+from tb.cpu.core_divider import DISTINCTIVE, DIVISION
+
+MULTIPLICATION = DIVISION & ~(1 << 14)  # what all four codes have in common
 MUL, MULH, MULHSU, MULHU = (MULTIPLICATION | n << 12 for n in range(4))
-DISTINCTIVE = 0x7F | 0x7F << 25 | 1 << 14  # the bits that make an instruction a multiplication
 
 
 def product(instruction, a, b, w=32):
