@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // register_bus -- send each access of the soft core to the register block that holds the address.
 //
-// latency   0 cycles from an access to select at its block, 1 cycle from the answers of the blocks
-//           and of register_memory to rdata.
-// rate      one access per cycle
+// latency   1 cycle from address and 0 cycles from select to the select of its block, 1 cycle from
+//           the answers of the blocks and of register_memory to rdata
+// rate      one access every 2 cycles
 // source    the addresses of tables/registers.rdl: node at 0x000, RS-485 bus at 0x100, peripherals
 //           at 0x200, axis n at 0x400 + n * 0x100, its feedback channel at 0xC00 + n * 0x100, its
 //           actuator at 0x1400 + n * 0x100
@@ -18,7 +18,7 @@ module register_bus #(
 ) (
     input wire clk,
     input wire select,  // strobe: an access
-    input wire [15:0] address,  // byte address inside the register map
+    input wire [15:0] address,  // byte in the register map, the same one cycle before select
     input wire [31:0] memory_rdata,  // settings in the word of the last access
     input wire [31:0] node_rdata,  // live bits, 1 cycle after node_select
     input wire [31:0] bus_rdata,  // live bits, 1 cycle after bus_select
@@ -39,17 +39,27 @@ module register_bus #(
     end
 
     wire [7:0] block = address[15:8];
+    // the blocks of the address of the cycle before
+    logic node, bus, peripherals;
+    logic [AXES-1:0] axis, feedback, actuator;
 
-    always_comb begin
-        node_select        = select && block == 8'd0;
-        bus_select         = select && block == 8'd1;
-        peripherals_select = select && block == 8'd2;
+    always_ff @(posedge clk) begin
+        node        <= block == 8'd0;
+        bus         <= block == 8'd1;
+        peripherals <= block == 8'd2;
         for (int n = 0; n < AXES; n++) begin
-            axis_select[n]     = select && block == 8'(4 + n);
-            feedback_select[n] = select && block == 8'(12 + n);
-            actuator_select[n] = select && block == 8'(20 + n);
+            axis[n]     <= block == 8'(4 + n);
+            feedback[n] <= block == 8'(12 + n);
+            actuator[n] <= block == 8'(20 + n);
         end
     end
+
+    assign node_select        = select && node;
+    assign bus_select         = select && bus;
+    assign peripherals_select = select && peripherals;
+    assign axis_select        = select ? axis : '0;
+    assign feedback_select    = select ? feedback : '0;
+    assign actuator_select    = select ? actuator : '0;
 
     // a block that was not read answers 0
     logic [31:0] answer;
@@ -87,6 +97,8 @@ module register_bus #(
     end
     always @(posedge clk) begin
         past <= 1'b1;
+        if (!past) assume (!select);
+        if (past && select) assume (address == $past(address));
         assert ((chosen & (chosen - 1'b1)) == '0);
         assert (select || chosen == '0);
         assert (node_select == (select && block == 0) && bus_select == (select && block == 1));

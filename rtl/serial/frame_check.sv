@@ -2,7 +2,7 @@
 // frame_check -- watch the words for this node and report which frames are good and which are
 // broken.
 //
-// latency   9 cycles from a word at the input to valid, `good` and the end of a frame
+// latency   9 cycles from a word at the input to valid, `good` and the end of a frame, 10 to sync
 // rate      one word in 10 cycles; data and command must stay as they are from valid_in to valid
 // method    The CRC-32 of command, length and body is made bit by bit and compared with the four
 //           bytes after them.
@@ -78,7 +78,6 @@ module frame_check #(
     assign valid      = done && passes;
     assign good       = ended && !wrong;
     assign frame_good = valid && good;
-    assign sync       = frame_good && to_all;
     assign frame_bad  = broken || (valid && ended && wrong);
 
     always_ff @(posedge clk) begin
@@ -88,6 +87,7 @@ module frame_check #(
             ended   <= word && last;
         end
         broken <= interrupted || (word && state == LENGTH && misfit);
+        sync   <= frame_good && to_all && !rst;
 
         if (call) to_all <= data[3:0] == 4'd0;
         if (call) state <= data[5] ? LENGTH : IDLE;
@@ -148,7 +148,7 @@ module frame_check #(
             assert (done == (since == 4'd9));
             if (good && valid) assert (ended && !running);
             assert (!(frame_good && frame_bad));
-            if (sync) assert (frame_good && to_all);
+            assert (sync == $past(frame_good && to_all));
             if (frame_good || frame_bad) assert (open);
             if (running) assert (open);
             if (open) assert (running || broken || (ended && passes && since <= 4'd9));

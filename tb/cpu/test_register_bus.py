@@ -20,9 +20,15 @@ OF_AXES = {name: base for name, (base, stride) in BLOCKS.items() if stride}
 
 
 async def check(dut, model, select, address, answering=True):
-    """Advance one cycle with this access, and with answers to an earlier one; without `answering`
-    the memory alone answers. Return the answers.
+    """Advance one cycle with this address and another with the access, if `select` is set. Return
+    the selects and the answer of the memory; without `answering` the memory alone answers.
     """
+    await cycle(dut, model, 0, address, answering)
+    return await cycle(dut, model, select, address, answering)
+
+
+async def cycle(dut, model, select, address, answering=True):
+    """Advance one cycle; arguments and result as for `check`."""
     word = lambda: random.getrandbits(32) if answering else 0
     memory, alone = random.getrandbits(32), [word() for _ in ALONE]
     several = [[word() for _ in range(model.axes)] for _ in OF_AXES]
@@ -31,12 +37,18 @@ async def check(dut, model, select, address, answering=True):
         getattr(dut, f"{block}_rdata").value = answer
     for block, words in zip(OF_AXES, several, strict=True):
         getattr(dut, f"{block}_rdata").value = sum(x << 32 * n for n, x in enumerate(words))
+    await Timer(1, "ns")  # much less than a cycle
+    got = selects(dut)
+    assert got == model.selects(select), f"address {address:#x}: selects {got}"
     await FallingEdge(dut.clk)
-    got = tuple(int(getattr(dut, f"{block}_select").value) for block in (*ALONE, *OF_AXES))
-    assert got == model.selects(select, address), f"address {address:#x}: selects {got}"
-    model.step(select, memory, *alone, *several)
+    model.step(select, address, memory, *alone, *several)
     assert int(dut.rdata.value) == model.rdata
-    return memory
+    return got, memory
+
+
+def selects(dut):
+    """The selects as RegisterBus.selects returns them."""
+    return tuple(int(getattr(dut, f"{block}_select").value) for block in (*ALONE, *OF_AXES))
 
 
 async def begin(dut):
@@ -60,21 +72,27 @@ async def each_block_is_selected_at_both_ends_of_its_range(dut):
     ]
     for block, base in enumerate(bases):
         for address in (base, base + 0xFC):
-            await check(dut, model, 1, address)
-            alone, several = model.selects(1, address)[:3], model.selects(1, address)[3:]
-            selects = [*alone, *(mask >> n & 1 for mask in several for n in range(model.axes))]
-            assert selects == [n == block for n in range(len(bases))]
+            got, _ = await check(dut, model, 1, address)
+            alone, several = got[: len(ALONE)], got[len(ALONE) :]
+            chosen = [*alone, *(mask >> n & 1 for mask in several for n in range(model.axes))]
+            assert chosen == [n == block for n in range(len(bases))]
 
 
 @cocotb.test()
-async def latency_is_0_from_an_access_to_select(dut):
+async def latency_is_1_from_an_address_and_0_from_select_to_the_select_of_its_block(dut):
     await begin(dut)
-    dut.select.value, dut.address.value = 1, OF_AXES["axis"]
-    await Timer(1, "ns")  # much less than a cycle
-    assert int(dut.axis_select.value) == 1
-    dut.address.value = ALONE["node"]
-    await Timer(1, "ns")
-    assert int(dut.axis_select.value) == 0 and int(dut.node_select.value) == 1
+    chosen = {}
+    for name, base in (("node", ALONE["node"]), ("axis", OF_AXES["axis"])):
+        dut.address.value = base
+        await FallingEdge(dut.clk)
+        dut.select.value = 1
+        await Timer(1, "ns")  # much less than a cycle
+        chosen[name] = selects(dut)
+        dut.select.value = 0
+        await Timer(1, "ns")
+        assert not any(selects(dut))
+        await FallingEdge(dut.clk)
+    assert chosen == {"node": (1, 0, 0, 0, 0, 0), "axis": (0, 0, 0, 1, 0, 0)}
 
 
 @cocotb.test()
@@ -104,11 +122,11 @@ async def no_block_is_selected_at_other_addresses(dut):
         *(first + 0x100 * model.axes for first in OF_AXES.values()),
         0xFFFC,
     ):
-        await check(dut, model, 1, address)
-        memory = await check(dut, model, 1, address, answering=False)
-        assert not any(model.selects(1, address)) and int(dut.rdata.value) == memory
-    assert not any(model.selects(0, 0))
-    await check(dut, model, 0, 0)
+        got, _ = await check(dut, model, 1, address)
+        _, memory = await cycle(dut, model, 0, address, answering=False)
+        assert not any(got) and int(dut.rdata.value) == memory
+    got, _ = await check(dut, model, 0, 0)
+    assert not any(got)
 
 
 @cocotb.test()

@@ -16,27 +16,30 @@ def frame(command, body):
     ]
 
 
-CYCLES = 9  # from a word to its result
+CYCLES = 9  # from a word to its result; sync comes one cycle later
 
 
 class FrameCheck:
     def __init__(self, longest=64):
         self.longest = longest
         self.bytes = None  # of the running frame, the command byte first
-        self.left, self.result = 0, None  # cycles until the result of a word: passed, ended, good
+        # cycles until the result of a word: passed, ended, good, for all nodes
+        self.left, self.result = 0, None
+        self.to_all = 0  # in the cycle before a good frame for all nodes ended
 
     def step(self, valid, data, command, framing_error, rst=0):
         if rst:
-            self.bytes, self.left = None, 0
+            self.bytes, self.left, self.to_all = None, 0, 0
             return 0, None, 0, 0, 0
-        broken = passed = ended = good = sync = 0
-        out = 0, None, 0, 0, 0
+        broken = passed = ended = good = to_all = 0
+        out = 0, None, 0, 0
+        sync, self.to_all = self.to_all, 0
         if self.left:
             self.left -= 1
             if not self.left and self.result[0]:
-                _, ended, good, sync = self.result
-                out = 1, good, good, int(ended and not good), sync
-                ended = good = sync = 0
+                _, ended, good, self.to_all = self.result
+                out = 1, good, good, int(ended and not good)
+                ended = good = 0
         if self.bytes is not None and framing_error:
             self.bytes, broken = None, 1
         if valid and command:
@@ -50,14 +53,14 @@ class FrameCheck:
             elif len(self.bytes) == length + 6:
                 ended = 1
                 good = int(zlib.crc32(self.bytes[:-4]) == int.from_bytes(self.bytes[-4:], "little"))
-                sync = int(good and not self.bytes[0] & 15)
+                to_all = int(good and not self.bytes[0] & 15)
                 self.bytes = None
         if valid:
-            self.left, self.result = CYCLES - 1, (passed, ended, good, sync)
-        return *out[:3], int(out[3] or broken), out[4]
+            self.left, self.result = CYCLES - 1, (passed, ended, good, to_all)
+        return *out[:3], int(out[3] or broken), sync
 
     def word(self, valid, data, command):
         """A word and the cycles that it takes: (passed, good, bad, sync)."""
-        seen = [self.step(valid and not n, data, command, 0) for n in range(CYCLES)]
-        passed, good, _, _, sync = seen[-1]
-        return passed, int(passed and good), sum(bad for *_, bad, _ in seen), sync
+        seen = [self.step(valid and not n, data, command, 0) for n in range(CYCLES + 1)]
+        passed, good, *_ = seen[CYCLES - 1]
+        return passed, int(passed and good), sum(bad for *_, bad, _ in seen), seen[-1][-1]

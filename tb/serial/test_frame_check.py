@@ -114,16 +114,16 @@ async def a_frame_written_by_hand_passes(dut):
 
 
 @cocotb.test()
-async def latency_is_9_and_good_comes_with_the_last_byte(dut):
+async def latency_is_9_with_good_at_the_last_byte_and_10_to_sync(dut):
     bus = await begin(dut)
-    *most, last = frame(0x25, [1, 2, 3])
+    *most, last = frame(0x20, [1, 2, 3])
     for word in most:
         assert await bus.word(*word) == ([(*word, 0)], 0, 0, 0)
     await bus.clk(1, *last)
     for _ in range(7):
         assert (await bus.clk(0, *last))[0] == 0
     assert await bus.clk(0, *last) == (1, *last, 1, 1, 0, 0)
-    assert (await bus.clk(0, *last))[0] == 0
+    assert await bus.clk(0, *last) == (0, *last, None, 0, 0, 1)
 
 
 @cocotb.test()

@@ -192,11 +192,11 @@ async def a_frame_for_all_nodes_is_a_sync_in_the_middle_of_its_last_stop_bit(dut
     assert int(dut.sync_axes.value) == 5
     words, at = frame(0x20, b"\x07"), []
     levels = [level for data, ninth in words for level in character(data, ninth)]
-    for n, level in enumerate(levels + [1] * 8):
+    for n, level in enumerate(levels + [1] * 12):
         for part in range(BIT):
             await bus.clk(level)
             at += [n * BIT + part] * int(dut.sync.value)
-    assert len(at) == 1 and 0 <= at[0] - (len(levels) * BIT - BIT // 2) <= 13
+    assert len(at) == 1 and 0 <= at[0] - (len(levels) * BIT - BIT // 2) <= 14
     assert await bus.read("syncs") == 1 and await bus.read("frames_good") == 1
     await bus.words(frame(0x20 | ADDRESS, b"\x08"))
     await bus.levels([1] * 8)
