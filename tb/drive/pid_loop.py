@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model of rtl/drive/pi_loop.sv in integers: clk(...) advances one cycle and returns (valid,
+"""Model of rtl/drive/pid_loop.sv in integers: clk(...) advances one cycle and returns (valid,
 command) after it; at_limit is an attribute.
 """
 
 PASS = 41  # cycles: one for each bit, and one to evaluate the result
-INTEGRATED, ADDED = 1 + PASS, 1 + 2 * PASS  # cycles after tick: integral and sum are complete
-LATENCY = ADDED + 1 + 16  # the command is given
-RETAKING = PASS - 17  # cycles more when the integral is retaken
+# cycles after tick: the integral, the sum and the damped sum are complete
+INTEGRATED, ADDED, DAMPED = 1 + PASS, 1 + 2 * PASS, 1 + 2 * PASS + 33
+LATENCY = DAMPED + 1 + 16  # the command is given
+RETAKEN = ADDED + PASS  # the same when the integral is retaken
+NEAR = 1 << 30  # LSB: the change of an error that is further counts as 0
 
 
 def held(x, most):
     return max(-most, min(most, x))
 
 
-class PiLoop:
+class PidLoop:
     def __init__(self):
         self.reset()
 
@@ -24,8 +26,9 @@ class PiLoop:
         # power was off since the last command
         self.stale = self.fresh = self.stopped = 1
         self.changed = self.changed_taken = self.retaking = 0
-        self.limited = 0  # +-1: the last command was above its limit
+        self.limited = 0  # +-1: integral and kp e were above the limit in the last tick
         self.at_limit = 0
+        self.last_error = None  # of the last tick, None: it was not near
 
     def clk(
         self,
@@ -35,6 +38,7 @@ class PiLoop:
         closed_loop=0,
         kp=0,
         ki=0,
+        kd=0,
         limit=0,
         gains_changed=0,
         target=0,
@@ -53,7 +57,7 @@ class PiLoop:
             self.n += 1
         taken = self.n == 0
         if taken:
-            self.kp, self.ki, self.limit = kp, ki, limit
+            self.kp, self.ki, self.kd, self.limit = kp, ki, kd, limit
             self.error = max(-1 << 31, min((1 << 31) - 1, target - position))
             self.changed_taken = self.changed
         elif self.n == INTEGRATED:
@@ -64,16 +68,18 @@ class PiLoop:
             self.retaking = int(bool(changed and self.ki and not no_power))
         elif self.n == ADDED:
             total = (self.integral >> 8) + self.kp * self.error
-            last = 0 if self.stopped else (self.command << 16) + self.fraction
             if self.retaking:
-                jump = last - total
-                self.integral = held(self.integral + (jump << 8), self.limit << 24)
-            asked = last if no_power or self.retaking else total
-            self.limited = (asked >> 16 > self.limit) - (asked >> 16 < -self.limit)
-            asked = self.limit * self.limited << 16 if self.limited else asked
-            self.asked, self.fraction = asked >> 16, asked & 0xFFFF
+                last = 0 if self.stopped else (self.command << 16) + self.fraction
+                self.integral = held(self.integral + (last - total << 8), self.limit << 24)
+            self.limited = self.limit_sum(total, no_power)
             self.fresh = self.fresh and no_power
-        elif self.n == LATENCY + self.retaking * RETAKING:
+            near = -NEAR <= self.error < NEAR
+            known = near and self.last_error is not None
+            self.change = self.error - self.last_error if known else 0
+            self.last_error = self.error if near else None
+        elif self.n == DAMPED and not self.retaking:
+            self.limit_sum((self.asked << 16) + self.fraction + self.kd * self.change, no_power)
+        elif self.n == (RETAKEN if self.retaking else LATENCY):
             self.command = self.asked if closed_loop else open_command
             self.at_limit = int(not no_power and abs(self.asked) == self.limit)
             self.limited = self.limited if closed_loop else 0
@@ -89,3 +95,12 @@ class PiLoop:
         if no_power:
             self.integral = self.fraction = 0
         return valid, self.command
+
+    def limit_sum(self, total, no_power):
+        """Limits the command, or holds the last one; returns +-1 if it was above its limit."""
+        last = 0 if self.stopped else (self.command << 16) + self.fraction
+        asked = last if no_power or self.retaking else total
+        limited = (asked >> 16 > self.limit) - (asked >> 16 < -self.limit)
+        asked = self.limit * limited << 16 if limited else asked
+        self.asked, self.fraction = asked >> 16, asked & 0xFFFF
+        return limited

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pi_loop: both terms by hand, anti-windup, bumpless transfer when loop, power or gains change,
+"""pid_loop: all terms by hand, anti-windup, bumpless transfer when loop, power or gains change,
 both ends of the ranges, and random ticks, with changes within them, against the model in every
 cycle.
 """
@@ -10,9 +10,9 @@ import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from tb.bench import run, start
-from tb.drive.pi_loop import LATENCY, RETAKING, PiLoop
+from tb.drive.pid_loop import LATENCY, RETAKEN, PidLoop
 
-INPUTS = "power closed_loop kp ki limit target position open_command".split()
+INPUTS = "power closed_loop kp ki kd limit target position open_command".split()
 ONE = 1 << 16  # of kp
 HALF = 1 << 23  # of ki
 MOST, LIMIT = (1 << 24) - 1, (1 << 15) - 1
@@ -22,7 +22,7 @@ class Loop:
     """The design with the model beside it in every cycle; `set` holds the inputs."""
 
     def __init__(self, dut):
-        self.dut, self.inputs, self.model = dut, dict.fromkeys(INPUTS, 0), PiLoop()
+        self.dut, self.inputs, self.model = dut, dict.fromkeys(INPUTS, 0), PidLoop()
 
     async def reset(self, **inputs):
         await start(self.dut, tick=0, gains_changed=0, **self.inputs)
@@ -67,17 +67,17 @@ class Loop:
 
 
 @cocotb.test()
-async def latency_is_101_and_a_tick_within_the_calculation_is_ignored(dut):
+async def latency_is_134_and_a_tick_within_the_calculation_is_ignored(dut):
     loop = await Loop(dut).reset(kp=ONE, target=9)
     await loop.tick()
     out, cycles = await loop.clk(tick=1), 1
     while not out[0]:
         out, cycles = await loop.clk(tick=1), cycles + 1
-    assert cycles == LATENCY + 1 == 101 and out[1] == 9
+    assert cycles == LATENCY + 1 == 134 and out[1] == 9
 
 
 @cocotb.test()
-async def both_terms_give_the_command_worked_out_by_hand(dut):
+async def the_terms_of_kp_and_ki_give_the_command_worked_out_by_hand(dut):
     loop = await Loop(dut).reset(kp=ONE)
     assert await loop.tick(target=70, position=-30) == 100
     assert await loop.tick(kp=ONE // 2, target=-33) == -2  # rounded down
@@ -85,6 +85,37 @@ async def both_terms_give_the_command_worked_out_by_hand(dut):
     loop.set(closed_loop=1, kp=0, ki=1 << 22, target=6, position=0)  # 6/4 of a count per tick
     assert [await loop.tick() for _ in range(6)] == [0, 1, 3, 4, 6, 7]  # the first is bumpless
     assert [await loop.tick(target=-6) for _ in range(6)] == [6, 4, 3, 1, 0, -2]
+
+
+@cocotb.test()
+async def the_lowest_bit_of_ki_has_no_part_in_the_sum(dut):
+    loop = await Loop(dut).reset(ki=1, target=1 << 23)  # half a count per tick
+    assert await loop.commands(6) == [0, 0, 1, 1, 2, 2]  # the first is bumpless
+    assert await loop.commands(4, target=0) == [2, 2, 2, 2]
+
+
+@cocotb.test()
+async def a_change_of_the_error_adds_to_the_command_for_one_tick(dut):
+    loop = await Loop(dut).reset(kd=ONE // 2, limit=1000)
+    assert await loop.commands(2) == [0, 0]
+    for error, want in ((60, 30), (60, 0), (-40, -50), (-41, -1), (-41, 0), (3000, 1000)):
+        assert await loop.tick(target=error) == want
+    assert await loop.tick(target=5) == -1000
+    loop.set(kp=ONE)
+    assert await loop.commands(2, target=1400) == [1000, 1000]
+    assert await loop.tick(target=1200) == 900  # 100 below the limit of the sum
+
+
+@cocotb.test()
+async def the_change_of_the_error_is_counted_from_the_open_loop_but_makes_no_jump(dut):
+    loop = await Loop(dut).reset(kd=ONE, ki=1, closed_loop=0, open_command=300, target=50)
+    assert await loop.commands(2) == [300, 300]
+    assert await loop.commands(2, closed_loop=1, target=90) == [300, 300]
+    assert await loop.tick(target=100) == 310
+    far = (1 << 30) + 100
+    assert await loop.commands(3, kp=0, ki=0, target=far) == [300] * 3  # far: no change
+    assert await loop.commands(3, target=far - 110) == [300] * 3
+    assert await loop.tick(target=far - 120) == 290
 
 
 @cocotb.test()
@@ -162,10 +193,21 @@ async def a_change_of_kp_makes_no_jump_in_the_command(dut):
 async def the_ends_of_every_range_match_the_model(dut):
     loop = await Loop(dut).reset()
     low, high = -1 << 47, (1 << 47) - 1
-    for target, position in ((high, low), (low, high), (1 << 31, 0), ((-1 << 31) - 1, 0)):
+    for target, position in (
+        (high, low),
+        (low, high),
+        (1 << 31, 0),
+        ((-1 << 31) - 1, 0),
+        ((1 << 30) - 1, 0),
+        (-1 << 30, 0),
+        (1 << 30, 0),
+        ((-1 << 30) - 1, 0),
+    ):
         for gain in (0, 1, MOST):
             for limit in (0, 1, LIMIT):
-                await loop.tick(kp=gain, ki=gain, target=target, position=position, limit=limit)
+                await loop.tick(
+                    kp=gain, ki=gain, kd=gain, target=target, position=position, limit=limit
+                )
 
 
 @cocotb.test()
@@ -183,6 +225,7 @@ async def random_ticks_and_a_reset_in_mid_flow_match_the_model(dut):
         if n % 10 == 5:
             loop.set(limit=random.getrandbits(random.randrange(1, 16)))
             await loop.gains(kp=random.getrandbits(18), ki=random.getrandbits(20))
+            loop.set(kd=random.getrandbits(20) * random.getrandbits(1))
         if n % 50 == 40:
             await loop.clk(tick=1)
             for _ in range(random.randrange(LATENCY)):
@@ -205,6 +248,7 @@ async def a_change_of_any_input_within_a_calculation_matches_the_model(dut):
                         ("closed_loop", random.getrandbits(1)),
                         ("kp", random.getrandbits(20)),
                         ("ki", random.getrandbits(20) * random.getrandbits(1)),
+                        ("kd", random.getrandbits(20)),
                         ("limit", random.getrandbits(random.randrange(1, 16))),
                         ("open_command", random.getrandbits(16) - (1 << 15)),
                         ("position", random.randrange(-5000, 5000)),
@@ -231,17 +275,17 @@ async def the_limit_that_was_sampled_with_the_tick_holds_for_its_command(dut):
 
 
 @cocotb.test()
-async def latency_is_24_more_when_the_integral_is_retaken(dut):
+async def latency_is_125_when_the_integral_is_retaken(dut):
     loop = await Loop(dut).reset(kp=ONE, ki=1 << 20, target=9)
     await loop.tick()
     await loop.gains(kp=2 * ONE)
-    for want in (LATENCY + RETAKING, LATENCY):
+    for want in (RETAKEN, LATENCY):
         out, cycles = await loop.clk(tick=1), 0
         while not out[0]:
             out, cycles = await loop.clk(), cycles + 1
         assert cycles == want
-    assert LATENCY + 1 + RETAKING == 125
+    assert RETAKEN + 1 == 125
 
 
-def test_pi_loop():
-    run("pi_loop", __file__)
+def test_pid_loop():
+    run("pid_loop", __file__)

@@ -1,38 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
-// pi_loop -- compute a PI controller in bit-serial arithmetic: 2^16 command = kp e + integral,
-// where e = target - position, and integral += ki e.
+// pid_loop -- compute a PID controller in bit-serial arithmetic: 2^16 command = kp e + integral +
+// kd (e - last e), where e = target - position, and integral += ki e.
 //
-// latency   101 cycles from tick to valid, 125 in a tick in which the integral is retaken
-// rate      one command per tick, a tick at least 125 cycles after the one before. An earlier tick
+// latency   134 cycles from tick to valid, 125 in a tick in which the integral is retaken
+// rate      one command per tick, a tick at least 134 cycles after the one before. An earlier tick
 //           is ignored.
 // behaviour The inputs are sampled with tick. Anti-windup: the integral is limited to limit, does
-//           not grow in a direction in which the last command was at its limit, and is zero in open
-//           loop and without power. Bumpless transfer: after the loop was closed, the power came on
+//           not grow in a direction in which integral + kp e was above limit in the last tick, and
+//           is zero in open loop and without power. Bumpless transfer: after the loop was closed, the power came on
 //           or kp changed, the command is held for one tick (at 0 while the power was off), and the
 //           integral is retaken: it takes the value from which the next command continues, as far
 //           as limit allows; with ki = 0 the command follows kp at once. A tick whose inputs were
 //           taken without power does not count: the command is held. Opening the loop gives
-//           open_command at once.
+//           open_command at once. The change of the error is added to the sum after that was
+//           limited, and is counted from the last tick, whether or not the loop was closed; it has
+//           no part in a tick in which the integral is retaken, nor if one of its two errors is
+//           2^30 LSB or more.
 // method    A number of 40 bits, 2^-24 command each, passes in 40 cycles, the lowest bit first.
-//           INTEGRATE adds ki e to the integral, ADD adds kp e to that, and GIVE shifts the command
-//           out of its result. Each adds error << n for bit n of the gain, and the number bit by
-//           bit as the carry. Whether the result is above limit is known when its last bit is, so
-//           the pass that reads it puts limit in its place. To retake the integral, ADD subtracts
-//           kp e from the held command, and GIVE lasts 40 cycles, since it limits the integral.
-// model     tb/drive/pi_loop.py, equal in every bit of every cycle
+//           INTEGRATE adds ki e to the integral, ADD adds kp e to that, DAMP adds kd times the
+//           change of e to the upper 32 bits of that, and GIVE shifts the command out of its
+//           result. Each adds error << n for bit n of the gain, and the number bit by bit as the
+//           carry. Whether the result is above limit is known when its last bit is, so the pass
+//           that reads it puts limit in its place. To retake the integral, ADD subtracts kp e from
+//           the held command; then GIVE follows at once and lasts 40 cycles, since it limits the
+//           integral.
+// model     tb/drive/pid_loop.py, equal in every bit of every cycle
 // proved    A command of the closed loop is within the limit that was sampled with its tick,
 //           whatever gains and inputs do. An open-loop command is passed on unchanged. command
 //           changes only with valid.
 // proof     depth 12
 `default_nettype none
 
-module pi_loop (
+module pid_loop (
     input  wire                clk,
     input  wire                rst,
     input  wire                power,          // level: commands pass to the drive
     input  wire                closed_loop,    // level: 0: command is open_command
     input  wire         [23:0] kp,             // 2^-16 command/LSB of position
     input  wire         [23:0] ki,             // 2^-24 command/LSB of position, each tick
+    input  wire         [23:0] kd,             // 2^-16 command/LSB of position per tick
     input  wire         [14:0] limit,          // largest |command| and |integral|, full scale 2^15
     input  wire                gains_changed,  // strobe: kp is new, +-1 cycle
     input  wire                tick,           // strobe: take the inputs
@@ -43,13 +49,15 @@ module pi_loop (
     output logic signed [15:0] command,        // full scale 2^15
     output logic               at_limit        // level: command is of the closed loop, and +-limit
 );
-    // steps of a pass: the first one, the first whole bit of a command, the sign
-    localparam bit [5:0] FIRST = 6'd24, WHOLE = 6'd48, SIGN = 6'd63;
+    // steps of a pass: the first one, the first bit of the fraction of a command, its first whole
+    // bit, the sign
+    localparam bit [5:0] FIRST = 6'd24, FRACTION = 6'd32, WHOLE = 6'd48, SIGN = 6'd63;
 
-    enum logic [1:0] {
+    enum logic [2:0] {
         WAIT,
         INTEGRATE,
         ADD,
+        DAMP,
         GIVE
     } state;
 
@@ -57,11 +65,13 @@ module pi_loop (
     logic passes;  // a bit passes
     logic done;  // all bits have passed
 
-    // inputs of this tick; the error is 2^-16 period and saturates if it is far
-    logic [23:0] taken_kp, taken_ki;
+    // inputs of this tick; the error is 2^-16 period and saturates if it is far. When ADD has read
+    // it, it becomes the change of the error, which counts if this error and the last one are near.
+    logic [23:0] taken_kp, taken_ki, taken_kd;
     logic [14:0] taken_limit;
-    logic [30:0] error;
+    logic [30:0] error, last_error;
     logic far, negative;
+    logic near, last_near;  // |error| is below 2^30
 
     // the bit that passes: of limit and of the held command; the gain adds the error, which can be
     // 2^31 - 1 or negative
@@ -87,23 +97,30 @@ module pi_loop (
     logic positive_above, negative_above, held_above, held_below;
     logic last_bit;  // bit of the result that passed last
     logic integral_over, integral_low;  // the integral is to be limited, at -limit
-    logic over, low;  // the command is, or was, at its limit, at -limit
+    logic sum_over, sum_low;  // integral and kp e were to be limited, at -limit
+    logic over, low;  // the command is to be limited, at -limit
     logic bound_one;  // a bit of limit was 1
     logic is_high, is_low;  // the bits of the new command that have passed are those of +-limit
 
     wire               take = state == WAIT && tick;
     wire signed [48:0] distance = {target[47], target} - {position[47], position};
+    wire signed [31:0] change = {error[30], error} - {last_error[30], last_error};
     wire               powerless = !closed_loop || !power;
     wire               no_power = stale || powerless;
 
     // the bits of step
     wire        [63:0] ki_bits = {16'd0, taken_ki, 24'd0};
     wire        [63:0] kp_bits = {8'd0, taken_kp, 32'd0};
+    wire        [63:0] kd_bits = {8'd0, taken_kd, 32'd0};
     wire        [63:0] limit_bits = {1'b0, taken_limit, 48'd0};
     wire        [63:0] held_bits = {command, fraction, 32'd0};
-    wire               blocked = over && low == negative;
-    wire               ki_bit = state == INTEGRATE && ki_bits[step];
-    wire               gain = (ki_bit && !blocked) || (state == ADD && kp_bits[step]);
+    wire               blocked = sum_over && sum_low == negative;
+    // the step of a done pass is the first one of the next: of it, DAMP has a bit of its gain
+    wire               ki_bit = state == INTEGRATE && !done && ki_bits[step];
+    wire               kp_bit = state == ADD && !done && kp_bits[step];
+    wire               damps = state == DAMP ? !done : state == ADD && done;
+    wire               kd_bit = damps && near && kd_bits[step];
+    wire               gain = (ki_bit && !blocked) || kp_bit || kd_bit;
 
     wire               integral_bound = limit_bit ^ (bound_one && integral_low);
     wire               integral_bit = integral_over ? integral_bound : integral[0];
@@ -112,12 +129,17 @@ module pi_loop (
 
     // The sum of the product and a number, plus 2^39 so that what is above 40 bits is 0 if the sum
     // fits. The held command less the product is the complement of its complement plus the product.
-    wire               start_bit = retaking && fraction_on ? held_bit : integral_bit;
+    wire               sum_limited = over && whole_on ? command_bound : fraction[0];
+    wire               integral_start = retaking && fraction_on ? held_bit : integral_bit;
+    wire               start_bit = state == DAMP ? sum_limited : integral_start;
     wire               carry = start_bit ^ retaking ^ sign_bit;
     wire        [31:0] operand = {adds_sign, ({31{adds_error}} & error) | {31{adds_ones}}};
     wire        [33:0] sum = {high[31], high, 1'b1} + {operand[31], operand, carry};
     wire               sum_bit = sum[1] ^ retaking ^ sign_bit;
     wire               unused = &{1'b0, sum[0]};
+
+    wire        [ 5:0] after_add = retaking ? FIRST : FRACTION;
+    wire        [ 5:0] next_first = state == ADD ? after_add : state == DAMP ? WHOLE : FIRST;
 
     // the result of a pass, when it is done; it has 64 bits at most
     wire               too_long = high[23:0] != '0;
@@ -127,6 +149,8 @@ module pi_loop (
     wire               held_over = held_low ? held_below : held_above;
     wire               holds = retaking || no_power;
     wire               to_limit = holds ? held_over : result_over;
+    wire               command_low = holds ? held_low : result_low;
+    wire               summed = state == ADD || state == DAMP;  // the result is a command
 
     always_ff @(posedge clk) begin
         valid       <= state == GIVE && done;
@@ -160,7 +184,7 @@ module pi_loop (
             is_high        <= 1'b1;
             is_low         <= 1'b1;
         end
-        if (step == '0) step <= state == ADD && !retaking ? WHOLE : FIRST;
+        if (step == '0) step <= next_first;
         case (state)
             INTEGRATE: begin
                 integrates <= integrates || ki_bit;
@@ -174,18 +198,29 @@ module pi_loop (
             end
             ADD: begin
                 if (passes) integral <= {retaking ? sum_bit : integral_bit, integral[39:1]};
+                if (step == '0) begin
+                    error      <= change[30:0];
+                    negative   <= change[31];
+                    far        <= 1'b0;
+                    near       <= near && last_near;
+                    last_error <= error;
+                    last_near  <= near;
+                end
                 if (passes && !retaking) begin
                     {whole, fraction} <= {sum_bit, whole, fraction[15:1]};
                 end
                 if (done) begin
                     integral_over <= result_over;
                     integral_low  <= result_low;
-                    hold          <= holds;
-                    over          <= to_limit;
-                    low           <= holds ? held_low : result_low;
+                    sum_over      <= to_limit;
+                    sum_low       <= command_low;
                     if (!no_power) fresh <= 1'b0;
-                    state <= GIVE;
+                    state <= retaking ? GIVE : DAMP;
                 end
+            end
+            DAMP: begin
+                if (passes) {whole, fraction} <= {sum_bit, whole, fraction[15:1]};
+                if (done) state <= GIVE;
             end
             GIVE: begin
                 if (passes && retaking) integral <= {integral_bit, integral[39:1]};
@@ -193,7 +228,7 @@ module pi_loop (
                 if (done) begin
                     command  <= closed_loop ? whole : open_command;
                     at_limit <= !no_power && (is_high || is_low);
-                    over     <= over && closed_loop;
+                    sum_over <= sum_over && closed_loop;
                     stopped  <= 1'b0;
                     state    <= WAIT;
                 end
@@ -206,9 +241,11 @@ module pi_loop (
                 if (tick) begin
                     taken_kp      <= kp;
                     taken_ki      <= ki;
+                    taken_kd      <= kd;
                     taken_limit   <= limit;
                     error         <= distance[30:0];
                     far           <= distance[48:31] != {18{distance[48]}};
+                    near          <= distance[48:30] == {19{distance[48]}};
                     negative      <= distance[48];
                     changed_taken <= changed;
                     state         <= INTEGRATE;
@@ -217,15 +254,20 @@ module pi_loop (
         endcase
         stale   <= powerless || (stale && !take);
         changed <= gains_changed || (changed && !take);
+        if (summed && done) begin
+            hold <= holds;
+            over <= to_limit;
+            low  <= command_low;
+        end
         if (powerless) fresh <= 1'b1;
         if (!power) stopped <= 1'b1;
         if (no_power) integral <= '0;
-        if (no_power || (state == ADD && done && to_limit)) fraction <= '0;
+        if (no_power || (summed && done && to_limit)) fraction <= '0;
         if (stopped && no_power) whole <= '0;
         if (rst) begin
             state <= WAIT;
             step  <= FIRST;
-            {valid, command, at_limit, over, changed, integral, fraction} <= '0;
+            {valid, command, at_limit, sum_over, changed, integral, fraction, last_near} <= '0;
             {stale, fresh, stopped} <= '1;
         end
     end
@@ -245,7 +287,7 @@ module pi_loop (
     wire                powered = !(stopped && stale);
     always @(posedge clk) begin
         past <= 1'b1;
-        if (state == ADD && done) source <= !holds ? whole : stopped ? '0 : command;
+        if (summed && done) source <= !holds ? whole : stopped ? '0 : command;
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
             if (valid && $past(closed_loop)) assert (command <= most && command >= -most);
@@ -261,9 +303,11 @@ module pi_loop (
         if (past && state != WAIT) begin
             // the steps
             assert (!(passes && done));
-            if (!passes) assert (step == (state == ADD && !retaking ? WHOLE : FIRST));
+            if (!passes) assert (step == (done ? next_first : state == DAMP ? FRACTION : FIRST));
             assert (step == '0 || step >= FIRST);
             assert (passes || done || state == INTEGRATE);
+            assert (state <= GIVE);
+            if (state == DAMP) assert (!retaking && (step == '0 || step > FRACTION || done));
             assert (whole_on == (passes && now[5:4] == 2'b11));
             if (passes) assert (fraction_on == now[5]);
             if (state == INTEGRATE) assert (!retaking && step <= SIGN);
@@ -271,12 +315,12 @@ module pi_loop (
             // the bits that pass, and what has been compared
             assert (limit_bit == (whole_on && limit_bits[now]));
             if (passes) assert (bound_one == (limit_passed != '0));
-            if (state == ADD && !stopped) begin
+            if (summed && !stopped) begin
                 if (whole_on) assert (held_bit == command[now[3:0]]);
                 assert (held_above == (held_passed > limit_passed));
                 assert (held_below == ((mask & ~command) >= limit_passed));
             end
-            if (state == ADD && !retaking && powered && (fraction_on || done)) begin
+            if (summed && !retaking && powered && (fraction_on || done)) begin
                 if (done) assert (last_bit == whole[15]);
                 assert (positive_above == (whole_passed > limit_passed));
                 assert (negative_above == ((mask & ~whole_passed) >= limit_passed));
