@@ -3,7 +3,7 @@
 // bridge, a stepper driver or a DAC, with a fine stage that uses the DAC.
 //
 // latency  see bridge_pwm, step_generator, spi_dac and fine_stage
-// rate     one command per tick, a tick at least 125 cycles after the one before
+// rate     one command per tick, a tick at least 134 cycles after the one before
 // behaviour  The pins of a drive that is not built are idle.
 // source   S0: DC motor by PWM, piezo on top; S2: stepper; S3: current amplifier behind a DAC of 16
 //          bits
@@ -81,7 +81,7 @@ module actuator #(
     wire        [15:0] refresh;
     wire signed [15:0] dac_trim;
     // fine stage
-    wire [23:0] fine_kp, fine_ki;
+    wire [23:0] fine_kp, fine_ki, fine_kd;
     wire [14:0] fine_limit;
     wire fine_kp_written, fine_valid;
     wire signed [15:0] fine_command;
@@ -181,6 +181,7 @@ module actuator #(
             // settings
             .kp           (fine_kp),
             .ki           (fine_ki),
+            .kd           (fine_kd),
             .limit        (fine_limit),
             .gains_changed(fine_kp_written),
             // motion
@@ -194,7 +195,7 @@ module actuator #(
         );
     end else begin : g_no_fine
         assign {fine_valid, fine_command, fine_saturated} = '0;
-        wire unused_settings = &{1'b0, fine, fine_kp, fine_ki, fine_limit, fine_kp_written};
+        wire unused_settings = &{1'b0, fine, fine_kp, fine_ki, fine_kd, fine_limit, fine_kp_written};
         wire unused_motion = &{1'b0, compared, target, position};
     end
 
@@ -261,7 +262,8 @@ module actuator #(
         .fine_kp_written,
         .fine_ki,
         .fine_limit,
-        .fine_command
+        .fine_command,
+        .fine_kd
     );
 endmodule
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// fine_stage -- control the fine stage: a PI loop with the same target as the main servo, which
+// fine_stage -- control the fine stage: a PID loop with the same target as the main servo, which
 // drives the DAC.
 //
-// latency  101 cycles from tick to command, 125 in a tick in which the integral is retaken
-// rate     one command per tick, a tick at least 125 cycles after the one before
+// latency  134 cycles from tick to command, 125 in a tick in which the integral is retaken
+// rate     one command per tick, a tick at least 134 cycles after the one before
 // behaviour  While the fine stage does not hold the position, its command returns to the middle by
 //          RETURN in each tick. That is slow enough for the main servo to follow. When the fine
 //          stage takes over, its loop continues from the command that it has at that moment.
@@ -20,6 +20,7 @@ module fine_stage #(
     input  wire                hold,           // level: the fine stage holds the position
     input  wire         [23:0] kp,             // 2^-16 command/LSB of position
     input  wire         [23:0] ki,             // 2^-24 command/LSB of position, each tick
+    input  wire         [23:0] kd,             // 2^-16 command/LSB of position per tick
     input  wire         [14:0] limit,          // largest |command|, full scale 2^15
     input  wire                gains_changed,  // strobe: kp is new
     input  wire                tick,           // strobe: target of this servo tick is known
@@ -33,13 +34,14 @@ module fine_stage #(
     wire signed [15:0] closer = moved[15] == command[15] ? moved : 16'sd0;
     wire               at_limit;
 
-    pi_loop u_loop (
+    pid_loop u_loop (
         .clk,
         .rst,
         .power       (enable),
         .closed_loop (hold && enable),
         .kp,
         .ki,
+        .kd,
         .limit,
         .gains_changed,
         .tick,

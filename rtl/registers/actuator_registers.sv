@@ -50,7 +50,9 @@ module actuator_registers #(
     // integral gain of the fine stage, each tick [1/16777216 command/(period/65536)]
     output logic        [23:0] fine_ki,
     output logic        [14:0] fine_limit,                 // largest |command| of the fine stage
-    input  wire signed  [15:0] fine_command                // command of the fine stage
+    input  wire signed  [15:0] fine_command,               // command of the fine stage
+    // derivative gain of the fine stage [1/65536 command/(period/65536/tick)]
+    output logic        [23:0] fine_kd
 );
     logic get_steps;
     logic get_fine_command;
@@ -85,6 +87,7 @@ module actuator_registers #(
         if (HAS_FINE_STAGE != 0 && put && word == 6'h0C) fine_kp <= wdata[23:0];
         if (HAS_FINE_STAGE != 0 && put && word == 6'h0D) fine_ki <= wdata[23:0];
         if (HAS_FINE_STAGE != 0 && put && word == 6'h0E) fine_limit <= wdata[14:0];
+        if (HAS_FINE_STAGE != 0 && put && word == 6'h10) fine_kd <= wdata[23:0];
 
         if (rst) begin
             get_steps <= 1'b0;
@@ -105,6 +108,7 @@ module actuator_registers #(
             fine_kp <= 24'h000000;
             fine_ki <= 24'h000000;
             fine_limit <= 15'h0000;
+            fine_kd <= 24'h000000;
         end
     end
 endmodule

@@ -151,7 +151,7 @@ module register_layout #(
             9'h145, 9'h147: mask = (has_stepper ? 32'h0000FFFF : 32'd0);
             9'h149: mask = (has_dac ? 32'h00FFFFFF : 32'd0);
             9'h14A: mask = (has_dac ? 32'h0000FFFF : 32'd0);
-            9'h14C, 9'h14D: mask = (has_fine_stage ? 32'h00FFFFFF : 32'd0);
+            9'h14C, 9'h14D, 9'h150: mask = (has_fine_stage ? 32'h00FFFFFF : 32'd0);
             9'h14E: mask = (has_fine_stage ? 32'h00007FFF : 32'd0);
             default: mask = '0;
         endcase

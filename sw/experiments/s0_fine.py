@@ -16,7 +16,7 @@ sine. This distance is the same at every homing.
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -29,14 +29,14 @@ from experiments.s0_stage import LEFT_OUT, Stage, random_moves, table
 from moire.analysis import report
 from moire.client.records import CalibrationState
 from moire.errors import MoireError
-from twin import BuildError
+from twin import WITH_SEGMENTS, BuildError
 from twin.build import ROOT
 from twin.machines.machine import MachineHandle, Trace
 from twin.nodes.twin import drives
 
 REQUIRED_NM = 10.0  # the aim of the paper
-NODE = {**drives("HAS_BRIDGE", "HAS_DAC", "HAS_FINE_STAGE"), "FILTERS": 0}
-FINE: dict[str, str | float] = {
+NODE = {**WITH_SEGMENTS, **drives("HAS_BRIDGE", "HAS_DAC", "HAS_FINE_STAGE")}
+FINE: Mapping[str, str | float] = {
     # 9 Hz; with twice this gain the mode of the flexure at 500 Hz (Q = 25) would oscillate
     "fine_ki": 20000 / 2**24,
     "fine_reach": "100nm",
@@ -53,10 +53,11 @@ FOLDER = ROOT / "build" / "report" / "s0_fine"
 @dataclass
 class FineStage(Stage):
     """The stage of S0 with a piezo on the table of each axis. `sine_zero_nm` is the zero of the
-    sine signal that is nearest to `zero_nm`.
+    sine signal that is nearest to `zero_nm`. `fine` are the parameters of the fine stage.
     """
 
     sine_zero_nm: dict[str, float] = field(default_factory=dict)
+    fine: Mapping[str, str | float] = field(default_factory=lambda: FINE)
 
     @classmethod
     def power_up(cls, seed: int = 1, names: Sequence[str] = ("X",), **plant: Any) -> Self:
@@ -91,7 +92,7 @@ class FineStage(Stage):
 
     def switch_fine_on(self, name: str) -> None:
         """Sets the parameters of the fine stage."""
-        for parameter, value in FINE.items():
+        for parameter, value in self.fine.items():
             self.axes[name].set_parameter(parameter, value)
 
     def machine(self, name: str) -> MachineHandle:

@@ -62,10 +62,9 @@ def s0_fine_nm_rms(count: int = MOVES, seed: int = SEED) -> float:
     return float(np.sqrt((errors_nm(count, seed) ** 2).mean()))
 
 
-def s0_hold_nm_rms(
-    positions: Sequence[float] = POSITIONS_NM, hold_s: float = HOLD_S, seed: int = SEED
-) -> float:
-    stage, found = prepared_stage(seed), []
+def jitter_nm_rms(stage: FineStage, positions: Sequence[float], hold_s: float) -> float:
+    """The largest jitter of all axes and standstills."""
+    found = []
     with bar("standstills") as progress:
         task = progress.add_task("", total=len(positions) * len(stage.axes))
         for position in positions:
@@ -79,6 +78,12 @@ def s0_hold_nm_rms(
                 )
                 progress.advance(task)
     return float(max(found))
+
+
+def s0_hold_nm_rms(
+    positions: Sequence[float] = POSITIONS_NM, hold_s: float = HOLD_S, seed: int = SEED
+) -> float:
+    return jitter_nm_rms(prepared_stage(seed), positions, hold_s)
 
 
 # ------------------------------------------------------------------ signals that drift

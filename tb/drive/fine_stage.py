@@ -3,23 +3,24 @@
 saturated) after it.
 """
 
-from tb.drive.pi_loop import PiLoop
+from tb.drive.pid_loop import PidLoop
 
 RETURN = 16  # command counts per tick
 
 
 class FineStage:
     def __init__(self):
-        self.loop = PiLoop()
+        self.loop = PidLoop()
         self.command = 0
 
-    def clk(self, enable, hold, kp, ki, limit, target, position, tick=0, **strobes):
+    def clk(self, enable, hold, kp, ki, kd, limit, target, position, tick=0, **strobes):
         closer = max(abs(self.command) - RETURN, 0) * (1 if self.command > 0 else -1)
         valid, self.command = self.loop.clk(
             power=int(enable),
             closed_loop=int(hold and enable),
             kp=kp,
             ki=ki,
+            kd=kd,
             limit=limit,
             tick=tick,
             target=target,

@@ -11,8 +11,8 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.drive.fine_stage import RETURN, FineStage
 
-LATENCY = 101  # cycles from tick to command
-INPUTS = dict(enable=1, hold=1, kp=1 << 16, ki=0, limit=1000, target=0, position=0)
+LATENCY = 134  # cycles from tick to command
+INPUTS = dict(enable=1, hold=1, kp=1 << 16, ki=0, kd=0, limit=1000, target=0, position=0)
 
 
 class Stage:
@@ -49,7 +49,7 @@ class Stage:
 
 
 @cocotb.test()
-async def latency_is_101(dut):
+async def latency_is_134(dut):
     stage = await Stage(dut).reset()
     await stage.tick()
     valid, cycles = (await stage.clk(tick=1))[0], 1
@@ -95,7 +95,8 @@ async def random_ticks_and_a_reset_in_mid_flow_match_the_model(dut):
             hold=int(random.random() < 0.6),
         )
         if n % 20 == 10:
-            stage.inputs.update(kp=random.getrandbits(18), ki=random.getrandbits(20))
+            gains = dict(kp=18, ki=20, kd=20)
+            stage.inputs.update({name: random.getrandbits(n) for name, n in gains.items()})
             await stage.clk(gains_changed=1)
         if n % 50 == 40:
             await stage.clk(tick=1)

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xFD44F463u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x6A61BF3Bu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -978,8 +978,10 @@ enum bus_parameter {
     // segment table: 0 off, 1 each segment has the mean of its borders (S0), 2 linear
     // interpolation; it is in force after homing
     BUS_PARAMETER_SEGMENTS = 90,
+    // [1/65536] fine stage: derivative gain, for the change of the error in a tick
+    BUS_PARAMETER_FINE_KD = 91,
 };
-#define BUS_PARAMETER_COUNT 90u
+#define BUS_PARAMETER_COUNT 91u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define BUS_PARAMETERS(X) \
@@ -1072,7 +1074,8 @@ enum bus_parameter {
     X(segment_count, 87, 1LL, 255LL, 120LL) \
     X(segment_length, 88, 1LL, 70368744177664LL, 81920000LL) \
     X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
-    X(segments, 90, 0LL, 2LL, 0LL)
+    X(segments, 90, 0LL, 2LL, 0LL) \
+    X(fine_kd, 91, 0LL, 16777215LL, 0LL)
 
 // X(parameter, field of axis.built without which it accepts only 0 and its default)
 #define BUS_PARAMETER_NEEDS(X) \
@@ -1129,7 +1132,8 @@ enum bus_parameter {
     X(FILTER_2_B2, FILTERS) \
     X(FILTER_2_A1, FILTERS) \
     X(FILTER_2_A2, FILTERS) \
-    X(SEGMENTS, SEGMENTS)
+    X(SEGMENTS, SEGMENTS) \
+    X(FINE_KD, FINE_STAGE)
 
 // X(parameter, block, register, field), in the order of the addresses
 #define BUS_PARAMETER_REGISTERS(X) \
@@ -1163,7 +1167,8 @@ enum bus_parameter {
     X(DAC_TRIM, ACTUATOR, DAC_TRIM, DAC_TRIM) \
     X(FINE_KP, ACTUATOR, FINE_KP, FINE_KP) \
     X(FINE_KI, ACTUATOR, FINE_KI, FINE_KI) \
-    X(FINE_LIMIT, ACTUATOR, FINE_LIMIT, FINE_LIMIT)
+    X(FINE_LIMIT, ACTUATOR, FINE_LIMIT, FINE_LIMIT) \
+    X(FINE_KD, ACTUATOR, FINE_KD, FINE_KD)
 
 // X(number, function), and X(parameter, number of the function that applies it)
 #define BUS_PARAMETER_FUNCTIONS(X) \
@@ -1275,6 +1280,6 @@ enum bus_setting {
     X(job_speed, 20, 1LL, 100LL, 100LL)
 
 // Of all parameters and settings: it changes with the meaning of a saved number.
-#define BUS_VALUES_CRC 0x522AA65Du
+#define BUS_VALUES_CRC 0x7AE15DE2u
 
 #endif

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xbbfab873u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x9eeae345u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -1468,5 +1468,10 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define ACTUATOR_FINE_COMMAND_MASK 0x0000ffffu
 #define ACTUATOR_FINE_COMMAND_SHIFT 0
 #define ACTUATOR_FINE_COMMAND_WIDTH 16
+// rw: derivative gain of the fine stage [1/65536 command/(period/65536/tick)]
+#define ACTUATOR_FINE_KD 0x040u
+#define ACTUATOR_FINE_KD_MASK 0x00ffffffu
+#define ACTUATOR_FINE_KD_SHIFT 0
+#define ACTUATOR_FINE_KD_WIDTH 24
 
 #endif

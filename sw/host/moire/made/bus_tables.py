@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xFD44F463
+PROTOCOL_CRC = 0x6A61BF3B
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -814,6 +814,9 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               0, 2, 0,
               "segment table: 0 off, 1 each segment has the mean of its borders "
               "(S0), 2 linear interpolation; it is in force after homing", "SEGMENTS"),
+    Parameter("fine_kd", 91, "", Fraction(1, 65536),
+              0, 16777215, 0,
+              "fine stage: derivative gain, for the change of the error in a tick", "FINE_STAGE"),
 )}
 
 SETTINGS = {parameter.name: parameter for parameter in (

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xBBFAB873  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x9EEAE345  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -1829,6 +1829,12 @@ FIELDS = (
         0x3C, 0, 16, True, "r", "",
         Fraction(1, 1),
         "command of the fine stage",
+    ),
+    Field(
+        "actuator", "fine_kd", "value",
+        0x40, 0, 24, False, "rw", "command/(period/65536/tick)",
+        Fraction(1, 65536),
+        "derivative gain of the fine stage",
     ),
 )
 BY_NAME = {(f.block, f.register, f.field): f for f in FIELDS}
