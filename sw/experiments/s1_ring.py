@@ -26,7 +26,7 @@ from rich.table import Table
 
 from experiments import report_page
 from moire.analysis import report
-from moire.analysis.harmonic_fit import Harmonics, Readings, fit, read_readings
+from moire.analysis.harmonic_fit import MOST_ORDERS, Harmonics, Readings, fit, read_readings
 from moire.bus.transport import BITS, Transport
 from moire.client.relay import Relay, Settings, Status, make_set, terms_of
 from moire.errors import BadFile, MoireError
@@ -95,14 +95,16 @@ def measure(
     angles: Array,
     source: np.random.Generator,
     scatter: float = SCATTER,
-    start_s: float = 0.0,
+    dwell_s: float = DWELL_S,
 ) -> Readings:
     """Readings at these angles of the encoder: the difference from a reference. The ring is at rest
     anywhere within the count.
     """
     encoder = angles + source.uniform(-0.5, 0.5, len(angles)) * 360 / ring.counts_per_turn
-    true = true_angle(ring, encoder, start_s + DWELL_S * np.arange(len(angles)))
+    true = true_angle(ring, encoder, dwell_s * np.arange(len(angles)))
     error = 3600 * (angles - true) + source.uniform(-scatter, scatter, len(angles))
+    if jitter := ring.parameters["ring_jitter"]:
+        error += jitter * source.normal(size=len(angles))
     return Readings(angles, error, np.arange(1, len(angles) + 1))
 
 
@@ -126,8 +128,9 @@ def as_in_the_paper(readings: Readings) -> Harmonics:
 
 
 def set_of(found: Harmonics, counts_per_turn: int) -> bytes:
-    """The correction set of the relay for these harmonics."""
-    return make_set(terms_of(found, counts_per_turn), Settings(counts_per_turn), ORDERS)
+    """The correction set of the relay for these harmonics, of more orders if they need them."""
+    orders = max(ORDERS, found.orders)
+    return make_set(terms_of(found, counts_per_turn), Settings(counts_per_turn), orders)
 
 
 def corrections_of(whole: bytes, counts: Iterable[float]) -> Array:
@@ -137,7 +140,7 @@ def corrections_of(whole: bytes, counts: Iterable[float]) -> Array:
     angles = [(int(count) % turn * step >> 16) % 2**32 for count in counts]
     numbers = [words[4], len(terms) // 2, *terms, len(angles), *angles]
     done = subprocess.run(
-        [simulation(HARMONIC_DRIVER, HARMONIC_MAP, K=ORDERS)],
+        [simulation(HARMONIC_DRIVER, HARMONIC_MAP, K=MOST_ORDERS)],
         input=" ".join(map(str, numbers)),
         capture_output=True,
         text=True,
@@ -150,7 +153,11 @@ def each_left_by_map(ring: RotaryRing, found: Harmonics, angles: Array) -> Array
     """The remaining error in arcsec at these true angles: the true error of the ring minus the
     correction by the RTL.
     """
-    error, turn = error_of(ring, angles), ring.counts_per_turn
+    return left_of(error_of(ring, angles), ring.counts_per_turn, found, angles)
+
+
+def left_of(error: Array, turn: int, found: Harmonics, angles: Array) -> Array:
+    """What the correction by the RTL leaves of this error in arcsec at these true angles."""
     counts = np.round((angles + error / 3600) / 360 * turn)
     left = error - corrections_of(set_of(found, turn), counts) * 1_296_000 / turn
     return left - float(left.mean())

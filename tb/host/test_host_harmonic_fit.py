@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from moire.analysis.harmonic_fit import Readings, fit, read_readings
+from moire.analysis.harmonic_fit import Readings, fit, fit_drifting, read_readings
 from moire.errors import BadFile, OutOfRange
 from tb.bench import seed
 
@@ -102,6 +102,33 @@ def test_the_noise_of_one_revolution_is_unknown_unless_given():
     )
     assert fit(readings(error)).noise is None and np.all(fit(readings(error)).weight == 1)
     assert np.all(fit(readings(error), noise=1.15).weight[3:] < 1)
+
+
+def test_a_slow_drift_is_told_from_the_low_orders_by_strides_of_50_degrees():
+    source = np.random.default_rng(seed())
+    angle, left = np.arange(37) * 50.0, {fit: [], fit_drifting: []}
+    for _ in range(20):
+        turns = source.uniform(0, 2 * math.pi, 20)
+        size = np.array([90, 25, 8, *(6.4 / k for k in range(4, 21))])
+        orders = size * np.cos(turns), size * np.sin(turns)
+        slow = 1.6 * np.sin(2 * math.pi * np.arange(37) / 14 + source.uniform(0, 2 * math.pi))
+        made, truth = readings(ring(angle, *orders) + slow, angle), ring(FINE, *orders)
+        for method, found in (
+            (fit, fit(made, orders=16, noise=1.15)),
+            (fit_drifting, fit_drifting(made, 16, 0.1, 1.15, 5)),
+        ):
+            left[method].append(np.std(truth - found.at(FINE)))
+        assert np.all(found.weight[:3] > 0.99) and np.all((0 < found.weight) & (found.weight < 1))
+    assert np.mean(left[fit_drifting]) < 0.9 * np.mean(left[fit])
+
+
+def test_a_drift_needs_readings_at_many_angles_and_orders_that_the_relay_has():
+    few, made = np.arange(0, 361, 30.0), readings(ring(TEN, [100], [0]))
+    with pytest.raises(OutOfRange, match="12 angles carry 5 orders; .* it takes 8"):
+        fit_drifting(readings(ring(few, [100], [0]), few), 5, 0.1, 1, 5)
+    for orders in (0, 33):
+        with pytest.raises(OutOfRange, match=f"1 to 32 orders, not {orders}"):
+            fit_drifting(made, orders, 0.1, 1, 5)
 
 
 # files

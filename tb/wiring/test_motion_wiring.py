@@ -450,6 +450,11 @@ def test_the_fine_stage_holds_by_its_gains_and_limit(node, axis):
     node.watch_words("dac_cs_n", "dac_sclk", "dac_sdi")
     node.run(TICK)
     assert {word for _, word, _ in words(node, axis)} == {32768 + 1000}
+    node.write("actuator.fine_kd", 4000, axis=axis)
+    node.watch_words("dac_cs_n", "dac_sclk", "dac_sdi")
+    node.count(axis, -1)
+    node.ticks(3)
+    assert {32768 + 1250 + 1000, 32768 + 1250} <= {word for _, word, _ in words(node, axis)}
     node.write("actuator.fine_ki", 1 << 16, axis=axis)
     node.ticks(3)
     now = node.read("actuator.fine_command", axis=axis)

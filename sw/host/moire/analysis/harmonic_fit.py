@@ -38,6 +38,8 @@ OUTLIER = 8.0  # times the usual scatter around the fit
 MOUNTING_ORDERS = 3  # eccentricity, tilt, distortion
 FEWEST = 5  # readings
 FEWEST_FOR_NOISE = 12  # degrees of freedom
+FEWEST_FOR_DRIFT = 8  # orders that the readings carry
+MOUNTING_POWER = 1e4  # arcsec squared, of a coefficient of the first orders: anything
 
 
 @dataclass(frozen=True)
@@ -279,7 +281,7 @@ def fit(
     if not 1 <= orders <= most:
         raise OutOfRange(f"{readings.angles} angles carry 1 to {most} orders, not {orders}")
     solved = least_squares(readings, orders)
-    constant, cosine, sine = solved[0], solved[1::2], solved[2::2]
+    cosine, sine = solved[1::2], solved[2::2]
     residual = readings.error - design(readings.angle, orders) @ solved
     power = cosine**2 + sine**2
     if noise is None and weighted:
@@ -287,9 +289,55 @@ def fit(
     floor = 4 * noise**2 / len(readings.error) if noise and weighted else 0.0
     signal = signal_power(power, floor) if floor else power
     weight = signal / np.maximum(signal + floor, 1e-30)
+    solved[1:] *= np.repeat(weight, 2)
+    return harmonics(readings, solved, weight, noise)
+
+
+def fit_drifting(
+    readings: Readings, orders: int, noise: float, drift: float, lasting: float
+) -> Harmonics:
+    """The most probable harmonics of readings that drift slowly; raises OutOfRange.
+
+    `noise` is the rms of a reading in arcsec without the drift, `drift` that of the drift, whose
+    correlation falls by e in `lasting` readings. All orders that the relay can have take part, also
+    those that the readings do not carry; above the first three they have the power law that fit()
+    finds. A drift is told from the low orders if each reading is some 50 degrees from the last
+    one, over several turns; then it looks like orders that are small.
+    """
+    if not 1 <= orders <= MOST_ORDERS:
+        raise OutOfRange(f"1 to {MOST_ORDERS} orders, not {orders}")
+    carried = min(readings.most_orders, MOST_ORDERS)
+    if carried < FEWEST_FOR_DRIFT:
+        raise OutOfRange(
+            f"{readings.angles} angles carry {carried} orders; to tell a drift from them it takes "
+            f"{FEWEST_FOR_DRIFT}"
+        )
+    solved = least_squares(readings, carried)
+    count = len(readings.error)
+    power = signal_power(solved[1::2] ** 2 + solved[2::2] ** 2, 4 * (noise**2 + drift**2) / count)
+    first, last = MOUNTING_ORDERS + 1, carried
+    slope = math.log(power[first - 1] / power[last - 1]) / math.log(last / first)
+    order = np.arange(1, MOST_ORDERS + 1)
+    variance = np.where(
+        order < first, MOUNTING_POWER, power[first - 1] * (order / first) ** -slope / 2
+    )
+    prior = np.concatenate([[MOUNTING_POWER], np.repeat(variance, 2)])
+    matrix = design(readings.angle, MOST_ORDERS)
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    scatter = drift**2 * np.exp(-apart / lasting) + noise**2 * np.eye(count)
+    gain = prior[:, None] * np.linalg.solve((matrix * prior) @ matrix.T + scatter, matrix).T
+    known = np.einsum("ij,ji->i", gain, matrix)  # the share of each coefficient that is known
+    found = (gain @ readings.error)[: 1 + 2 * orders]
+    weight = (known[1::2] + known[2::2])[:orders] / 2
+    return harmonics(readings, found, weight, math.hypot(noise, drift))
+
+
+def harmonics(readings: Readings, solved: Array, weight: Array, noise: float | None) -> Harmonics:
+    """The harmonics with these coefficients of the columns of design()."""
+    constant, cosine, sine = solved[0], solved[1::2], solved[2::2]
     made = Harmonics(
-        cosine * weight,
-        sine * weight,
+        cosine,
+        sine,
         weight,
         float(constant),
         noise,
@@ -297,6 +345,5 @@ def fit(
         float(np.max(np.abs(readings.error))),
         readings.angles,
     )
-    return replace(
-        made, left=float(np.max(np.abs(readings.error - constant - made.at(readings.angle))))
-    )
+    left = readings.error - constant - made.at(readings.angle)
+    return replace(made, left=float(np.max(np.abs(left))))
