@@ -195,7 +195,8 @@ module actuator #(
         );
     end else begin : g_no_fine
         assign {fine_valid, fine_command, fine_saturated} = '0;
-        wire unused_settings = &{1'b0, fine, fine_kp, fine_ki, fine_kd, fine_limit, fine_kp_written};
+        wire unused_settings = &{1'b0, fine, fine_limit};
+        wire unused_gains = &{1'b0, fine_kp, fine_ki, fine_kd, fine_kp_written};
         wire unused_motion = &{1'b0, compared, target, position};
     end
 

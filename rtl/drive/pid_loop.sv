@@ -7,14 +7,14 @@
 //           is ignored.
 // behaviour The inputs are sampled with tick. Anti-windup: the integral is limited to limit, does
 //           not grow in a direction in which integral + kp e was above limit in the last tick, and
-//           is zero in open loop and without power. Bumpless transfer: after the loop was closed, the power came on
-//           or kp changed, the command is held for one tick (at 0 while the power was off), and the
-//           integral is retaken: it takes the value from which the next command continues, as far
-//           as limit allows; with ki = 0 the command follows kp at once. A tick whose inputs were
-//           taken without power does not count: the command is held. Opening the loop gives
-//           open_command at once. The change of the error is added to the sum after that was
-//           limited, and is counted from the last tick, whether or not the loop was closed; it has
-//           no part in a tick in which the integral is retaken, nor if one of its two errors is
+//           is zero in open loop and without power. Bumpless transfer: after the loop was closed,
+//           the power came on or kp changed, the command is held for one tick (at 0 while the power
+//           was off), and the integral is retaken: it takes the value from which the next command
+//           continues, as far as limit allows; with ki = 0 the command follows kp at once. A tick
+//           whose inputs were taken without power does not count: the command is held. Opening the
+//           loop gives open_command at once. The change of the error is added to the sum after that
+//           was limited, and is counted from the last tick, whether or not the loop was closed; it
+//           has no part in a tick in which the integral is retaken, nor if one of its two errors is
 //           2^30 LSB or more.
 // method    A number of 40 bits, 2^-24 command each, passes in 40 cycles, the lowest bit first.
 //           INTEGRATE adds ki e to the integral, ADD adds kp e to that, DAMP adds kd times the

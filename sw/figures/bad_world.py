@@ -123,7 +123,8 @@ def fine_stage(segments: int, seed: int) -> FineStage:
     """The X axis with its piezo in a bad world: homed, calibrated, its scale measured. What drifts
     does so within the times of stage.toml.
     """
-    stage = FineStage.power_up(seed, **world("bad"))
+    effects: dict[str, Any] = world("bad")
+    stage = FineStage.power_up(seed, **effects)
     stage.fine = FINE
     with bar("homing, calibration, segments") as progress:
         task = progress.add_task("", total=2)
