@@ -9,6 +9,7 @@ from moire.bus.arbiter import Arbiter
 from moire.bus.gateway import Gateway
 from moire.bus.protocol import parse_reply, request_body
 from moire.client.names import CAUSE_CODES
+from moire.client.node import register_fields
 from moire.made.bus_tables import CAUSES
 from tb.fakes.bus_node import PERIOD, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
@@ -186,6 +187,61 @@ def test_a_request_that_the_node_does_not_know_is_passed_on(clients, node):
         reply = parse_reply(clients.arbiter.answer("A", 1, body))
         assert reply.sequence == body[0]
         assert reply.cause in (CAUSE_CODES["unknown_operation"], CAUSE_CODES["wrong_length"])
+
+
+def word(body):
+    """(register, value) of a body without its sequence number; no value of a reading."""
+    return int.from_bytes(body[1:3], "little"), int.from_bytes(body[3:], "little")
+
+
+def address_of(name):
+    return register_fields(name)[0].address(0)
+
+
+def test_the_words_of_a_register_of_64_bits_that_two_clients_read_stay_together():
+    register, count, latched = address_of("axis.position"), itertools.count(1), [0]
+
+    def ask(address, body):
+        """Reading the low word latches the high one; each value has two equal words."""
+        if word(body)[0] == register:
+            latched[0] = next(count)
+        return bytes([body[0], 0]) + latched[0].to_bytes(4, "little")
+
+    arbiter = Arbiter(ask, lambda: 0.0)
+
+    def read(client, number):
+        body = request_body("read_register", number % 256, address=number)
+        return parse_reply(arbiter.answer(client, 1, body)).fields["value"]
+
+    for _ in range(2):
+        low = [read(client, register) for client in "AB"]
+        assert low == [read(client, register + 4) for client in "AB"]
+        assert low[0] != low[1]
+
+
+def test_a_low_word_that_waits_for_its_high_word_is_not_taken_for_another_register():
+    start, step = (address_of(f"feedback.compare_{name}") for name in ("start", "step"))
+    written, waiting = {}, [0]
+
+    def ask(address, body):
+        """A low word waits; the next high word stores both."""
+        register, value = word(body)
+        if register in (start, step):
+            waiting[0] = value
+        else:
+            written[register - 4] = value << 32 | waiting[0]
+        return bytes([body[0], 0])
+
+    arbiter = Arbiter(ask, lambda: 0.0)
+    for client, register, value in (
+        ("A", start, 1),
+        ("B", step, 2),
+        ("A", start + 4, 3),
+        ("B", step + 4, 4),
+    ):
+        body = request_body("write_register", value, address=register, value=value)
+        assert arbiter.answer(client, 1, body) is not None
+    assert written == {start: 3 << 32 | 1, step: 4 << 32 | 2}
 
 
 def test_no_answer_is_no_reply_and_the_request_may_be_repeated():

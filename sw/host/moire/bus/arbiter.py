@@ -8,7 +8,8 @@ An axis that moves belongs to the client whose request began the motion. Another
 everything, stop the axis or switch its drive off; to begin a motion of its own, it has to stop the
 axis first. A client that leaves has its axes stopped under control, and then the drives switched
 off that it had switched on. Each client may repeat its last request to a node, whatever the others
-have sent in between: it gets the same reply, and the node does not see the repetition.
+have sent in between: it gets the same reply, and the node does not see the repetition. The two
+words of a register of 64 bits stay together, too.
 
 Bodies are those of docs/protocol.md. The arbiter does not send or receive; `ask` does.
 """
@@ -18,11 +19,13 @@ from dataclasses import dataclass
 
 from moire.bus.protocol import IN_MOTION, NAMES, REQUESTS, parse_reply
 from moire.made.bus_tables import CAUSES, OPERATIONS, STATES
+from moire.made.registers import BLOCKS, FIELDS
 
 # what begins a motion, or drives the axis in another way
 MOTIONS = frozenset({"home", "move", "prepare", "start", "start_at_sync", "turn_to", "arm_scope"})
 POLLS = frozenset({"identify", "status", "position", "encoder", "signal"})  # may be merged
 TABLE_AXIS = 0  # the axis of turn_to
+MOST_AXES = 8  # of a node
 OTHER_CLIENT = next(code for code, (name, _) in CAUSES.items() if name == "other_client")
 POLL_S = 0.02  # between two looks at an axis whose client has left, of the time of the bus
 
@@ -52,6 +55,7 @@ class Arbiter:
         # the last request of a client to a node, with its reply
         self.last: dict[tuple[Hashable, int], tuple[bytes, bytes]] = {}
         self.farewells: list[Farewell] = []
+        self.pairs = WordPairs(ask)
 
     # requests
 
@@ -65,7 +69,7 @@ class Arbiter:
         if operation in MOTIONS and any(self.is_of_another(client, place) for place in places):
             answered: Reply = bytes([body[1], OTHER_CLIENT])
         else:
-            answered = self.ask(address, body[1:])
+            answered = self.pairs.answer(client, address, operation, body)
         if answered is None:
             return None
         reply = body[:1] + answered
@@ -106,6 +110,7 @@ class Arbiter:
     def depart(self, client: Hashable) -> None:
         """A client has left: its axes have to be stopped and switched off."""
         self.last = {key: value for key, value in self.last.items() if key[0] != client}
+        self.pairs.forget(client)
         owned = {*self.moved_by.items(), *self.switched_on_by.items()}
         for place in sorted({place for place, owner in owned if owner == client}):
             self.farewells.append(Farewell(client, place, self.now()))
@@ -136,6 +141,70 @@ class Arbiter:
         else:
             self.switched_on_by.pop(place)
             self.ask(place[0], request("enable", axis=place[1], on=0))
+
+
+# ------------------------------------------------------------------ registers of 64 bits
+
+REGISTER_BYTES = 4
+LOW_WORDS = frozenset(
+    field.address(axis)
+    for field in FIELDS
+    if field.low + field.width > 32
+    for axis in range(MOST_AXES if BLOCKS[field.block][1] else 1)
+)
+
+
+class WordPairs:
+    """Keeps the two words of a register of 64 bits together. A node latches the high word when the
+    low one is read, and stores the low word when the high one is written; in between, the same
+    register or another one may be accessed for another client.
+    """
+
+    def __init__(self, ask: Ask):
+        self.ask = ask
+        # by client, node and register: the reply with the high word, read together with the low one
+        self.high_words: dict[tuple[Hashable, int, int], bytes] = {}
+        # by client and node: register and request of the low word that was written last
+        self.low_words: dict[tuple[Hashable, int], tuple[int, bytes]] = {}
+        self.low_word_of: dict[int, Hashable] = {}  # by node: who wrote the last low word
+
+    def answer(self, client: Hashable, address: int, operation: str, body: bytes) -> Reply:
+        """The reply of the node to any request, without its sequence number."""
+        if operation not in ("read_register", "write_register"):
+            return self.ask(address, body[1:])
+        register = fields_of(operation, body)["address"]
+        if operation == "read_register":
+            return self.read(client, address, register)
+        return self.write(client, address, register, body[1:])
+
+    def read(self, client: Hashable, address: int, register: int) -> Reply:
+        """One word; after a low word the high one is already here."""
+        known = self.high_words.pop((client, address, register), None)
+        if known is not None:
+            return known
+        low = self.ask(address, request("read_register", address=register))
+        if low is not None and register in LOW_WORDS:
+            high = self.ask(address, request("read_register", address=register + REGISTER_BYTES))
+            if high is not None:
+                self.high_words[client, address, register + REGISTER_BYTES] = high
+        return low
+
+    def write(self, client: Hashable, address: int, register: int, body: bytes) -> Reply:
+        """One word; before a high word, the low one again if another client has written since."""
+        if register in LOW_WORDS:
+            self.low_words[client, address] = register, body
+            self.low_word_of[address] = client
+        elif self.low_word_of.get(address, client) != client:
+            low, low_body = self.low_words.get((client, address), (None, b""))
+            if low == register - REGISTER_BYTES:
+                self.ask(address, low_body)
+                self.low_word_of[address] = client
+        return self.ask(address, body)
+
+    def forget(self, client: Hashable) -> None:
+        """A client has left."""
+        self.high_words = {key: word for key, word in self.high_words.items() if key[0] != client}
+        self.low_words = {key: word for key, word in self.low_words.items() if key[0] != client}
 
 
 # ------------------------------------------------------------------ bodies
@@ -170,7 +239,7 @@ def places_of(address: int, operation: str, body: bytes) -> Iterator[Place]:
     elif "axis" in fields:
         yield address, fields["axis"]
     elif "axes" in fields:
-        yield from ((address, axis) for axis in range(8) if fields["axes"] >> axis & 1)
+        yield from ((address, axis) for axis in range(MOST_AXES) if fields["axes"] >> axis & 1)
 
 
 def accepted(body: bytes) -> bool:
