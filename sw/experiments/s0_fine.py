@@ -76,19 +76,20 @@ class FineStage(Stage):
                 break
         return axis.calibration("freeze")
 
-    def prepare(self, name: str) -> CalibrationState:
-        """Homes and calibrates an axis, homes it again and switches its fine stage on. The zero is
-        the true position after a move to 0.
+    def prepare(self, name: str, calibrated: bool = True) -> CalibrationState:
+        """Homes and calibrates an axis, homes it again and switches its fine stage on; returns the
+        state of the calibration. The zero is the true position after a move to 0.
         """
         axis = self.axes[name]
         self.home(name)
-        calibrated = self.calibrate_ellipse(name)
-        self.home(name)
+        if calibrated:
+            self.calibrate_ellipse(name)
+            self.home(name)
         self.switch_fine_on(name)
         axis.move(nm=0, progress=self.record_while_moving(name))
         self.sine_zero_nm[name] = self.zero_nm[name]
         self.zero_nm[name] += float(np.mean(self.watch(name, ZERO_S)["true_nm"]))
-        return calibrated
+        return axis.calibration()
 
     def switch_fine_on(self, name: str) -> None:
         """Sets the parameters of the fine stage."""
