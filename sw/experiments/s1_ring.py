@@ -26,7 +26,7 @@ from rich.table import Table
 
 from experiments import report_page
 from moire.analysis import report
-from moire.analysis.harmonic_fit import MOST_ORDERS, Harmonics, Readings, fit, read_readings
+from moire.analysis.harmonic_fit import Harmonics, Readings, fit, read_readings
 from moire.bus.transport import BITS, Transport
 from moire.client.relay import Relay, Settings, Status, make_set, terms_of
 from moire.errors import BadFile, MoireError
@@ -140,7 +140,7 @@ def corrections_of(whole: bytes, counts: Iterable[float]) -> Array:
     angles = [(int(count) % turn * step >> 16) % 2**32 for count in counts]
     numbers = [words[4], len(terms) // 2, *terms, len(angles), *angles]
     done = subprocess.run(
-        [simulation(HARMONIC_DRIVER, HARMONIC_MAP, K=MOST_ORDERS)],
+        [simulation(HARMONIC_DRIVER, HARMONIC_MAP, K=len(terms) // 2)],
         input=" ".join(map(str, numbers)),
         capture_output=True,
         text=True,
