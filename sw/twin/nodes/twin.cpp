@@ -52,6 +52,14 @@ class Core {  // a Verilated node and its clock
         pins.rst = 0;
     }
     ~Core() { model_->final(); }
+    uint64_t digest() const {  // of all registers and memories, FNV-1a
+        const auto* all = reinterpret_cast<const uint8_t*>(&pins);
+        uint64_t sum = 0xCBF29CE484222325;
+        for (const Register& one : REGISTERS)
+            for (size_t n = 0; n < one.size * one.words; n++)
+                sum = (sum ^ all[one.offset + n]) * 0x100000001B3;
+        return sum;
+    }
     void clk() {  // not in reset
         rising_edge(pins, rest_);
         if (SERIAL_CORE)
@@ -117,6 +125,7 @@ class Node {
     bool flip(const Register& where, unsigned word, unsigned bit) {
         return core_ && core_->flip(where, word, bit);
     }
+    uint64_t digest() const { return core_ ? core_->digest() : 0; }
     void press_estop(bool pressed) {
         estop_ = pressed;
         if (core_) core_->pins.estop_open = pressed;
@@ -362,6 +371,7 @@ void twin_flip_at(Twin* t, uint64_t at, int node, int number, int word, int bit)
     t->flip = {at, size_t(node), size_t(number), unsigned(word), unsigned(bit), false};
 }
 int twin_flipped(Twin* t) { return t->flip.made; }  // 0: not yet, or the bit is no flip-flop
+uint64_t twin_digest(Twin* t, int node) { return t->nodes[size_t(node)]->digest(); }
 // One direction of the serial line between two nodes; its functions are peer_line_*.
 void* twin_join_peers(Twin* t, int from, int to, uint64_t seed, double baud) {
     t->peers.push_back({from, to, PeerLine(seed, 0x9EE2u + unsigned(from), CLK_HZ, baud)});

@@ -106,6 +106,7 @@ FUNCTIONS: Functions = {
     "twin_register": (ctypes.c_char_p, [WHOLE, HANDLE]),
     "twin_flip_at": (None, [HANDLE, LONG, WHOLE, WHOLE, WHOLE, WHOLE]),
     "twin_flipped": (WHOLE, [HANDLE]),
+    "twin_digest": (LONG, [HANDLE, WHOLE]),
     "frame_bench_new": (HANDLE, [WHOLE, HANDLE, WHOLE, REAL]),
     "frame_bench_delete": (None, [HANDLE]),
     "frame_bench_idle": (None, [HANDLE, LONG]),
@@ -502,6 +503,10 @@ class Twin:
         logic that has its level from others.
         """
         return bool(self.library.twin_flipped(self.handle))
+
+    def digest(self, node: int = 0) -> int:
+        """A number of 64 bits that two equal states of all registers and memories share."""
+        return int(self.library.twin_digest(self.handle, self.check_node(node)))
 
     # faults: estop of a node, line_cut of a node or of "host"; all others are of the machine of an
     # axis
