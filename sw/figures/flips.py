@@ -27,12 +27,14 @@ import numpy as np
 from campaigns.campaign import Campaign, Counts
 from experiments import s0_stage, s2_stage, s3_zero
 from figures.common import Figure, Quick, bar, console
-from figures.interlock import CAUSES, TICK_S, spoilt_firmware
+from figures.interlock import INSTRUCTIONS, TICK_S
+from firmware import build as firmware_build
 from moire.client.axis import Axis
 from moire.client.bus import Bus
 from moire.client.records import Status
 from moire.errors import BusError, Refused
-from twin import Twin
+from twin import Twin, build
+from twin.build import ROOT
 from twin.nodes.twin import Register
 
 TRACE_HZ = 4000
@@ -40,18 +42,21 @@ POLL_S = 0.01
 REST_S = 0.04  # of the observation after each motion, in which late requests are repeated, too
 LONGEST_S = 120  # of a processor for one flip, after which it counts as lost
 LONGEST_MOVE_S = 1.0
+BEFORE_S = 0.003  # of a motion, before a cause to stop
+LOOKS_S = (0.0, 0.0003, 0.002, 0.01)  # at a drive that must be off, each after the one before
+AT_ONCE = 2  # copies of a machine, in a figure
 WATCHDOG_S = 0.1  # setting of the bus watchdog
 MARGIN_S = 0.02  # after which a watchdog must have acted
 MEMORY_SHARE = 0.25  # flips of memories for one of a flip-flop
+NO_FLIP_FLOP = "no flip-flop"
 UNSAFE = ("wrong motion", "on without an answer", "lost")
-HOST = "g_core."  # path of the soft core
 # What stops a drive: names of registers as the RTL has them, from the pins to the outputs
 PROTECTION = re.compile(
     r"u_interlock\.|u_axis\.(?:faults|first_fault|fault_position|command|control_\w+)$|"
-    r"^drive_enable$|g_drive\.passed$|encoder_fault_mask$|u_actuator\.|u_inputs\.|u_estop\.|"
-    r"u_core_watchdog\.|u_rs485\.(?:u_watchdog\.|watchdog_time$|u_timeout\.|good$|u_check\.done$)|"
-    r"^watchdog_expired$|^heartbeat_kick$|^dac_\w+$|^bridge_\w+$|^step$|^direction$|"
-    r"strobes_reset_faults$|strobes_start$"
+    r"drive_enable$|g_drive\.passed$|encoder_fault_mask$|u_actuator\.|u_inputs\.|u_estop\.|"
+    r"u_core_watchdog\.|u_rs485\.(?:u_watchdog\.|watchdog_time$|u_timeout\.)|core_trap$|"
+    r"^watchdog_expired$|^heartbeat_kick$|^dac_\w+$|^bridge_\w+$|(?:^|__)step$|(?:^|__)direction$|"
+    r"strobes_reset_faults$"
 )
 
 
@@ -305,7 +310,7 @@ def outcome_of(run: Run | None, reference: Run, machine: Machine) -> tuple[str, 
     if run is None:
         return "lost", "the simulation died or did not end"
     if not run.flipped:
-        return "no flip-flop", ""
+        return NO_FLIP_FLOP, ""
     if run.same and not run.error:
         return "harmless", "state as without it"
     if run.silent:
@@ -358,3 +363,212 @@ def flips(
     for flip, run in forked(jobs, work, at_once):
         yield flip, *outcome_of(run, reference, machine)
     session.twin.close()
+
+
+# ------------------------------------------------------------------ what must stop a drive
+
+
+def inject(fault: str, session: Session, axis: int) -> None:
+    """Begins a fault of an axis, or of the node."""
+    session.twin.inject(fault, 0 if fault == "estop" else axis)
+
+
+def hang(session: Session, axis: int) -> None:
+    """Makes the soft core jump to itself where each round of the firmware begins."""
+    twin, axes = session.twin, len(session.axes)
+    words = build.firmware(axes=axes)
+    elf = ROOT / "build" / "firmware" / f"{firmware_build.stem_of('axis', axes, 'soft')}.elf"
+    _, symbols = firmware_build.read_elf(elf)
+    memory = next(one for one in session.registers if one.name.endswith("u_memory.memory"))
+    at = symbols["firmware_poll"] // 4
+    for bit in range(memory.bits):
+        if (words[at] ^ INSTRUCTIONS["hang"]) >> bit & 1:
+            twin.flip_after(0.0, memory, bit, at)
+            twin.run(1 / twin.clk_hz)
+
+
+def silence(session: Session, axis: int) -> None:
+    """Nothing: the host sends no more from now on."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Something after which a drive must be off."""
+
+    begin: Callable[[Session, int], None]
+    within_s: Callable[[Session], float]
+    watchdog_s: float = WATCHDOG_S  # setting of the bus watchdog; 0: no limit
+
+
+STOPS = {
+    **{
+        fault: Cause(partial(inject, fault), lambda session: TICK_S)
+        for fault in ("estop", "drive_fault", "limit_low", "limit_high")
+    },
+    # a bit of its counter costs a watchdog at most the time that it has counted so far
+    "bus": Cause(silence, lambda session: 2 * WATCHDOG_S + MARGIN_S),
+    "core": Cause(hang, lambda session: 2 * core_silence_s(session) + MARGIN_S, 0.0),
+}
+
+
+def protection_bits(registers: Sequence[Register]) -> list[tuple[Register, int, int]]:
+    """All bits of the interlock, the watchdogs, the inputs of what stops, and the outputs."""
+    return [bit for bit in bits_of(registers) if PROTECTION.search(bit[0].name)]
+
+
+def unstopped(session: Session, machine: Machine, flip_and_cause: tuple[Flip, str]) -> str:
+    """Begins a motion, flips a bit before or after a cause to stop, and returns what was wrong: ""
+    if the drive is off in time and stays off.
+    """
+    flip, name = flip_and_cause
+    cause, twin = STOPS[name], session.twin
+    found = re.search(r"g_axis\[(\d)\]", flip.register.name)
+    axis = int(found[1]) if found else 0
+    session.axes[0].set_parameter("watchdog_time", cause.watchdog_s)
+    for one, rest_nm in zip(session.axes, session.rest_nm, strict=True):
+        one.request("move", target=one.to_counts(rest_nm + machine.distance_nm))
+    twin.flip_after(flip.after_s, flip.register, flip.bit, flip.word)
+    twin.run(BEFORE_S)
+    # a flip that is still to come gives way to those of hang(): it has its turn in other trials
+    cause.begin(session, axis)
+    twin.run(cause.within_s(session))
+    for later_s in LOOKS_S:
+        twin.run(later_s)
+        if twin.truth(axis).enabled:
+            return f"on after {name}, {later_s * 1e3:g} ms late"
+    return ""
+
+
+def protection_flips(
+    name: str, part: int, parts: int, seed: int, at_once: int = 1, most: int | None = None
+) -> Iterator[tuple[Flip, str, str | None]]:
+    """(flip, cause to stop, what was wrong) of one part of all bits of what stops the drives of a
+    machine, each with each cause; None if the simulation died.
+    """
+    machine, source = MACHINES[name], random.Random(seed)
+    session = machine.power_up(seed)
+    tried = [(bit, cause) for bit in protection_bits(session.registers) for cause in STOPS]
+    random.Random(parts).shuffle(tried)
+    jobs = []
+    for bit, cause in tried[part::parts][:most]:
+        late_s = 0.0 if cause == "core" else STOPS[cause].within_s(session) / 2
+        jobs.append((Flip(*bit, source.uniform(0.0, BEFORE_S + late_s)), cause))
+    for (flip, cause), wrong in forked(jobs, partial(unstopped, session, machine), at_once):
+        yield flip, cause, wrong
+    session.twin.close()
+
+
+# ------------------------------------------------------------------ figures and campaigns
+
+
+def unsafe_flips(
+    count: int = 500, machines: Sequence[str] = tuple(MACHINES), seed: int = 1
+) -> float:
+    """Percent of so many flips of flip-flops of each machine that end in a wrong motion."""
+    classes: Counter[tuple[str, str]] = Counter()
+    worst: Counter[str] = Counter()
+    for name in machines:
+        for flip, kind, cause in flips(name, 0, 1, seed, AT_ONCE, count):
+            if flip.register.words > 1:
+                continue
+            classes[name, kind] += 1
+            if kind in UNSAFE:
+                worst[f"{name} {flip.register.name}"] += 1
+                console.print(f"  {name} {flip}: {kind}, {cause}", markup=False)
+    for (name, kind), number in sorted(classes.items()):
+        console.print(f"{name}: {number} {kind}")
+    bad = sum(number for (_, kind), number in classes.items() if kind in UNSAFE)
+    real = sum(number for (_, kind), number in classes.items() if kind != NO_FLIP_FLOP)
+    return 100 * bad / real
+
+
+def unsafe_protection_flips(
+    count: int = 1000, machines: Sequence[str] = tuple(MACHINES), seed: int = 1
+) -> float:
+    """Of so many flips in what stops the drives of each machine: those with a drive on too long."""
+    bad = 0
+    for name in machines:
+        for flip, cause, wrong in protection_flips(name, 0, 1, seed, AT_ONCE, count):
+            if wrong != "":
+                bad += 1
+                console.print(f"  {name} {flip}, {cause}: {wrong or 'died'}", markup=False)
+    return float(bad)
+
+
+FIGURES = {
+    "flips_unsafe_pct": Figure(
+        unsafe_flips,
+        "%",
+        "of 500 flips of random flip-flops of each of the nodes of S0, S2 and S3, at random moments "
+        "of a motion: those that end in a wrong motion without a fault",
+        "<= 0.5",
+        Quick({"count": 8, "machines": ("s3",)}, "8 flips in S3", "<= 20"),
+        2,
+    ),
+    "flips_unsafe_interlock": Figure(
+        unsafe_protection_flips,
+        "flips",
+        "of 1000 flips in each of these nodes, of random flip-flops of interlock, watchdogs, the "
+        "inputs of what stops a drive and the outputs, each with a cause to stop: those that leave "
+        "a drive on",
+        "0",
+        Quick({"count": 20, "machines": ("s3",)}, "20 flips in S3"),
+        0,
+    ),
+}
+PARTS = {"s0": 400, "s2": 1000, "s3": 100}  # of a campaign: some minutes each
+
+
+def flips_of_part(name: str, part: int, seed: int) -> Counts:
+    """The counts of one part of a campaign, one for each class."""
+    counts: Counter[str] = Counter({"flips": 0, "unsafe": 0})
+    bad = []
+    for flip, kind, cause in flips(name, part, PARTS[name], seed):
+        if kind == NO_FLIP_FLOP:
+            continue
+        memory = flip.register.words > 1
+        counts[f"{kind}, memory" if memory else kind] += 1
+        counts["flips"] += not memory
+        counts["unsafe"] += not memory and kind in UNSAFE
+        if kind in UNSAFE:
+            bad.append(f"{flip}: {kind}, {cause}")
+    return {**counts, **({"what": "\n".join(bad)} if bad else {})}
+
+
+def protection_of_part(name: str, part: int, seed: int) -> Counts:
+    """The counts of one part of the campaign over what stops the drives."""
+    counts: Counter[str] = Counter({"flips": 0, "unsafe": 0})
+    bad = []
+    for flip, cause, wrong in protection_flips(name, part, PARTS[name], seed):
+        counts["flips"] += 1
+        if wrong != "":
+            counts["unsafe"] += 1
+            bad.append(f"{flip}, {cause}: {wrong or 'died'}")
+    return {**counts, **({"what": "\n".join(bad)} if bad else {})}
+
+
+CAMPAIGNS = {
+    **{
+        f"flips_{name}": Campaign(
+            f"flips of every flip-flop of the node of {name.upper()} in a motion, and of random bits "
+            "of its memories; failed: a flip-flop that ends in a wrong motion without a fault",
+            partial(flips_of_part, name),
+            PARTS[name],
+            "flips",
+            "unsafe",
+            allowed=0.005,
+        )
+        for name in MACHINES
+    },
+    **{
+        f"interlock_flips_{name}": Campaign(
+            f"flips of every flip-flop of what stops the drives of {name.upper()}, each with each "
+            "cause to stop; failed: a drive stays on",
+            partial(protection_of_part, name),
+            PARTS[name],
+            "flips",
+            "unsafe",
+        )
+        for name in MACHINES
+    },
+}
