@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of bits that flip by themselves in the running chip: does any flip of a flip-flop end in a
-wrong motion without a fault, or keep a drive on that must be off.
+"""Figures of bits that flip by themselves in the running chip: does any flip of a flip-flop end in
+a wrong motion without a fault, or keep a drive on that must be off.
 
 The machine is settled once, in the parent process; each flip happens in a child, which fork()
 makes a copy of the settled machine. Every bit of every register is flipped once in each machine, at
@@ -19,14 +19,15 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import astuple, dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from campaigns.campaign import Campaign, Counts
 from experiments import s0_stage, s2_stage, s3_zero
-from figures.common import Figure, Quick, bar, console
+from figures.common import Figure, Quick, console
 from figures.interlock import INSTRUCTIONS, TICK_S
 from firmware import build as firmware_build
 from moire.client.axis import Axis
@@ -37,6 +38,7 @@ from twin import Twin, build
 from twin.build import ROOT
 from twin.nodes.twin import Register
 
+Path = npt.NDArray[np.float64]
 TRACE_HZ = 4000
 POLL_S = 0.01
 REST_S = 0.04  # of the observation after each motion, in which late requests are repeated, too
@@ -187,14 +189,15 @@ class Run:
     """What was seen of two moves, there and back."""
 
     error: str = ""  # what the host was told, "" if nothing was wrong
-    silent: bool = False  # the node does not answer, and a drive stays on
+    unanswered: bool = False  # the node does not answer, and a drive stays on
     on: bool = True  # the drives at the end, in truth
     flipped: bool = False
     same: bool = False  # the state became that of the reference, to the last bit
     repeats: int = 0  # of requests
-    states: list[Any] = field(default_factory=list)  # of node and machine after each poll
+    polls: int = 0
+    states: list[Any] = field(default_factory=list)  # of the reference after each poll
     took_s: list[float] = field(default_factory=list)  # of each move, until it had settled
-    paths: list[list[Any]] = field(default_factory=list)  # nm, of each axis there and back
+    paths: list[Path] = field(default_factory=list)  # nm, of each axis there and back
 
 
 def word_of(status: Status) -> str:
@@ -211,11 +214,14 @@ class Converged(Exception):
 
 
 def compared(session: Session, run: Run, reference: Run | None) -> None:
-    """Adds the state of node and machine; raises Converged if it is that of the reference."""
+    """Adds the state of node and machines to the reference; raises Converged if it is the same."""
     twin = session.twin
     machines = [astuple(twin.truth(n)) for n in range(len(session.axes))]
-    run.states.append((twin.digest(), machines, session.bus.statistics.repeats))
-    if reference and twin.flipped() and run.states[-1] in reference.states[len(run.states) - 1 :][:1]:
+    state = twin.digest(), machines, session.bus.statistics.repeats
+    run.polls += 1
+    if reference is None:
+        run.states.append(state)
+    elif twin.flipped() and [state] == reference.states[run.polls - 1 : run.polls]:
         raise Converged
 
 
@@ -264,9 +270,7 @@ def observed(
                 for axis in session.axes:
                     run.error = run.error or word_of(axis.status())
                 compared(session, run, reference)
-            run.paths += [
-                twin.take_trace(n)["position_m"] * 1e9 for n in range(len(session.axes))
-            ]
+            run.paths += [twin.take_trace(n)["position_m"] * 1e9 for n in range(len(session.axes))]
             if run.error:
                 break
     except Converged:
@@ -276,7 +280,7 @@ def observed(
     except BusError:
         run.error = "no answer"
         twin.run(WATCHDOG_S + core_silence_s(session) + MARGIN_S)
-        run.silent = bool(session.on)
+        run.unanswered = bool(session.on)
     run.repeats = session.bus.statistics.repeats - before
     run.flipped = twin.flipped()
     run.on = len(session.on) == len(session.axes)
@@ -313,7 +317,7 @@ def outcome_of(run: Run | None, reference: Run, machine: Machine) -> tuple[str, 
         return NO_FLIP_FLOP, ""
     if run.same and not run.error:
         return "harmless", "state as without it"
-    if run.silent:
+    if run.unanswered:
         return "on without an answer", run.error
     if run.error:
         return "fault", run.error
@@ -373,22 +377,33 @@ def inject(fault: str, session: Session, axis: int) -> None:
     session.twin.inject(fault, 0 if fault == "estop" else axis)
 
 
-def hang(session: Session, axis: int) -> None:
-    """Makes the soft core jump to itself where each round of the firmware begins."""
-    twin, axes = session.twin, len(session.axes)
+@cache
+def round_of_firmware(axes: int) -> tuple[int, int]:
+    """(number, content) of the word of the soft core's memory where each round begins."""
     words = build.firmware(axes=axes)
     elf = ROOT / "build" / "firmware" / f"{firmware_build.stem_of('axis', axes, 'soft')}.elf"
-    _, symbols = firmware_build.read_elf(elf)
-    memory = next(one for one in session.registers if one.name.endswith("u_memory.memory"))
-    at = symbols["firmware_poll"] // 4
+    number = firmware_build.read_elf(elf)[1]["firmware_poll"] // 4
+    return number, words[number]
+
+
+def hang(session: Session, axis: int) -> None:
+    """Makes the soft core jump to itself where each round of the firmware begins."""
+    twin = session.twin
+    number, content = round_of_firmware(len(session.axes))
+    memory = next(one for one in session.registers if one.name == "g_core.u_core.u_memory.memory")
     for bit in range(memory.bits):
-        if (words[at] ^ INSTRUCTIONS["hang"]) >> bit & 1:
-            twin.flip_after(0.0, memory, bit, at)
+        if (content ^ INSTRUCTIONS["hang"]) >> bit & 1:
+            twin.flip_after(0.0, memory, bit, number)
             twin.run(1 / twin.clk_hz)
 
 
 def silence(session: Session, axis: int) -> None:
     """Nothing: the host sends no more from now on."""
+
+
+def disable(session: Session, axis: int) -> None:
+    """The host switches the drive off."""
+    session.axes[axis].disable()
 
 
 @dataclass(frozen=True)
@@ -405,6 +420,7 @@ STOPS = {
         fault: Cause(partial(inject, fault), lambda session: TICK_S)
         for fault in ("estop", "drive_fault", "limit_low", "limit_high")
     },
+    "disable": Cause(disable, lambda session: MARGIN_S),
     # a bit of its counter costs a watchdog at most the time that it has counted so far
     "bus": Cause(silence, lambda session: 2 * WATCHDOG_S + MARGIN_S),
     "core": Cause(hang, lambda session: 2 * core_silence_s(session) + MARGIN_S, 0.0),
@@ -447,6 +463,7 @@ def protection_flips(
     """
     machine, source = MACHINES[name], random.Random(seed)
     session = machine.power_up(seed)
+    round_of_firmware(len(session.axes))  # once, before the copies
     tried = [(bit, cause) for bit in protection_bits(session.registers) for cause in STOPS]
     random.Random(parts).shuffle(tried)
     jobs = []
@@ -499,8 +516,8 @@ FIGURES = {
     "flips_unsafe_pct": Figure(
         unsafe_flips,
         "%",
-        "of 500 flips of random flip-flops of each of the nodes of S0, S2 and S3, at random moments "
-        "of a motion: those that end in a wrong motion without a fault",
+        "of 500 flips of random flip-flops of each of the nodes of S0, S2 and S3, at random "
+        "moments of a motion: those that end in a wrong motion without a fault",
         "<= 0.5",
         Quick({"count": 8, "machines": ("s3",)}, "8 flips in S3", "<= 20"),
         2,
@@ -550,8 +567,8 @@ def protection_of_part(name: str, part: int, seed: int) -> Counts:
 CAMPAIGNS = {
     **{
         f"flips_{name}": Campaign(
-            f"flips of every flip-flop of the node of {name.upper()} in a motion, and of random bits "
-            "of its memories; failed: a flip-flop that ends in a wrong motion without a fault",
+            f"flips of every flip-flop of the node of {name.upper()} in a motion, and of random "
+            "bits of its memories; failed: a flip-flop that ends in a wrong motion without a fault",
             partial(flips_of_part, name),
             PARTS[name],
             "flips",

@@ -142,6 +142,8 @@ void axis_poll(unsigned n) {
     case BUS_STATE_SETTLING:
         hold(n);
         outcome = motion_settle(n, parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW));
+        // plans are exact: another end means that a bit flipped, in the plan or on its way
+        if (outcome == BUS_CAUSE_OK && !motion_complete(n)) outcome = BUS_CAUSE_NOT_SETTLED;
         if (outcome != BUS_CAUSE_RUNNING) finish(n, outcome);
         break;
     case BUS_STATE_STOPPING:
