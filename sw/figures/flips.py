@@ -322,10 +322,8 @@ def outcome_of(run: Run | None, reference: Run, machine: Machine) -> tuple[str, 
     if run.error:
         return "fault", run.error
     path, end = distances(run, reference)
-    if path > machine.path_nm or end > machine.end_nm:
+    if path > machine.path_nm or end > machine.end_nm or not run.on:
         return "wrong motion", f"path {path:.0f} nm, end {end:.0f} nm"
-    if not run.on:
-        return "fault", "off without a word"
     if run.repeats > reference.repeats:
         return "recovered", "request repeated"
     if end > machine.end_nm / 10 or path > machine.path_nm / 10:
