@@ -78,8 +78,9 @@ int main(int count, char** arguments) {
         driving += a.rs485_driver_enable;
         rested += rest.known_0;
     }
-    std::printf("the same for %llu cycles, with %llu flips; the node drove the bus in %llu, and "
-                "rested in %llu\n",
-                (unsigned long long)cycles, (unsigned long long)flips, (unsigned long long)driving,
-                (unsigned long long)rested);
+    std::printf(
+        "the same for %llu cycles, with %llu flips; the node drove the bus in %llu, and "
+        "rested in %llu\n",
+        (unsigned long long)cycles, (unsigned long long)flips, (unsigned long long)driving,
+        (unsigned long long)rested);
 }
