@@ -25,7 +25,7 @@ FOLDER = ROOT / "build" / "coverage" / "software"
 FIRMWARE = ROOT / "sw" / "firmware"
 HOST = ROOT / "sw" / "host"
 TESTS = [ROOT / "tb" / name for name in ("firmware", "host")]
-DEPENDS = [*TESTS, ROOT / "tb" / "fakes", FIRMWARE, HOST, ROOT / "sw" / "twin"]
+DEPENDS = [*TESTS, ROOT / "tb" / "fakes", FIRMWARE, HOST, ROOT / "sw" / "twin" / "compiled"]
 COMPLETE = "complete"  # file: the tests passed with the sources of this digest
 LONGEST_S = 3 * 3600
 
