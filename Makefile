@@ -112,8 +112,8 @@ SOAK = $(if $(LIST),--list) $(if $(SCHEDULER),--scheduler '$(SCHEDULER)') $(if $
 soak: $(SETUP) $(FIRMWARE)     ## the long campaigns: K=names, SCHEDULER=tcp://… of a cluster, RESULTS=url; docs/campaigns.md
 	@$(PYTHON) -m campaigns.soak $K $(SOAK)
 
-coverage: $(SETUP) $(FIRMWARE) ## what the tests reach of RTL, firmware and host: docs/coverage.md, and its figures
-	@$(PYTHON) -m code_coverage --jobs $(JOBS)
+coverage: $(SETUP) $(FIRMWARE) ## what the tests reach of RTL, firmware and host: docs/coverage.md and figures; MINUTES=n
+	@$(PYTHON) -m code_coverage --jobs $(JOBS) $(if $(MINUTES),--minutes $(MINUTES))
 	@$(PYTHON) -m figures.figure coverage_line_pct coverage_branch_pct
 
 BOARDS := $(patsubst constraints/%/board.mk,%,$(wildcard constraints/*/board.mk))

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure what the tests reach of RTL, firmware and host package, and write docs/coverage.md.
 
-    python -m code_coverage [--jobs N]      (make coverage)
+    python -m code_coverage [--jobs N] [--minutes M]      (make coverage)
 
 Tests whose sources have not changed since they were measured are not run again, so a run that was
-interrupted continues. The exit code is 1 if a test failed, or if a reason explains nothing.
+interrupted continues. The page lists the tests for which there was no time. The exit code is 1 if a
+test failed, if a reason explains nothing, or if there was no time for all.
 """
 
 import argparse
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from datetime import date
 
@@ -35,9 +37,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m code_coverage", description="Measure what the tests reach."
     )
     parser.add_argument("--jobs", type=int, default=2, help="tests at a time (default 2)")
+    parser.add_argument(
+        "--minutes", type=float, default=float("inf"), help="after which no further test begins"
+    )
     options = parser.parse_args(arguments)
+    until = time.monotonic() + 60 * options.minutes
     tests = rtl.test_files()
-    faults = software.gather(options.jobs) + rtl.gather(tests, options.jobs)
+    faults = software.gather(options.jobs) + rtl.gather(tests, options.jobs, until)
     for fault in faults:
         print(fault, file=sys.stderr)
     if faults:
@@ -45,7 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     blocks, firmware, host = rtl.of_tests(tests), software.firmware(), software.host()
     parts = {"RTL": blocks, "firmware": firmware, "host": host}
     absent = [*rtl.not_simulated(blocks), *software.not_built(firmware)]
-    PAGE.write_text(page(blocks, firmware, host, absent, measured(), ROOT), encoding="utf-8")
+    left = [str(test.relative_to(ROOT)) for test in tests if not rtl.gathered(test)]
+    text = page(blocks, firmware, host, absent, left, measured(), ROOT)
+    PAGE.write_text(text, encoding="utf-8")
     stale = [
         f"{name}:{line}: everything here is reached, its reason must go"
         for files in parts.values()
@@ -58,7 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         shares = (f"{total(files.values(), kind).percent:.2f} % {kind}" for kind in KINDS)
         print(f"{title}: {', '.join(shares)}")
     print(PAGE.relative_to(ROOT))
-    return 1 if stale else 0
+    print(f"{len(left)} of {len(tests)} files of tests of blocks are not measured" if left else "")
+    return 1 if stale or left else 0
 
 
 if __name__ == "__main__":

@@ -150,11 +150,28 @@ def reasons(parts: Iterable[Files]) -> list[str]:
     return ["| place | reason |", "| --- | --- |", *found] if found else ["None."]
 
 
+def unmeasured(left: Sequence[str]) -> list[str]:
+    """The warning of a page that was made before all tests had been run."""
+    if not left:
+        return []
+    return [
+        f"**Not complete.** There was no time for {len(left)} files of tests of blocks, so blocks",
+        "are missing, and others are reached more than it says here:",
+        f"{', '.join(f'`{name}`' for name in left)}.\n",
+    ]
+
+
 def page(
-    rtl: Files, firmware: Files, host: Files, absent: Sequence[str], measured: str, root: Path
+    rtl: Files,
+    firmware: Files,
+    host: Files,
+    absent: Sequence[str],
+    left: Sequence[str],
+    measured: str,
+    root: Path,
 ) -> str:
-    """The whole page; `absent` are sources of which no test executes anything, and `measured` says
-    when and of which version.
+    """The whole page; `absent` are sources of which no test executes anything, `left` tests that
+    were not run, and `measured` says when and of which version.
     """
     parts = (rtl, firmware, host)
     texts = {name: (root / name).read_text().splitlines() for part in parts for name in part}
@@ -167,6 +184,7 @@ def page(
         [
             HEAD,
             f"{measured}\n",
+            *unmeasured(left),
             *table("RTL", rtl, 2, KINDS),
             *table("firmware", firmware, 3, KINDS[:2]),
             *table("host", host, 4, KINDS[:2]),

@@ -14,6 +14,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from collections import defaultdict
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -100,16 +101,23 @@ def run(test: Path) -> str:
     return ""
 
 
-def gather(tests: Iterable[Path], jobs: int) -> list[str]:
-    """Run the files of tests whose counts are missing. Returns what went wrong."""
+def gather(tests: Iterable[Path], jobs: int, until: float = float("inf")) -> list[str]:
+    """Run the files of tests whose counts are missing, and begin none after the time `until` of
+    time.monotonic(). Returns what went wrong.
+    """
+
+    def in_time(test: Path) -> str:
+        return run(test) if time.monotonic() < until else ""
+
     missing = [test for test in tests if not gathered(test)]
     with ThreadPoolExecutor(jobs) as pool:
-        return [fault for fault in pool.map(run, missing) if fault]
+        return [fault for fault in pool.map(in_time, missing) if fault]
 
 
 def of_tests(tests: Iterable[Path]) -> dict[str, Reached]:
-    """What was reached in files of tests that have been gathered."""
-    return reached(path for test in tests for path in sorted(folder_of(test).glob("*.dat")))
+    """What was reached in those of these files of tests that have been gathered."""
+    done = [folder_of(test) for test in tests if gathered(test)]
+    return reached(path for folder in done for path in sorted(folder.glob("*.dat")))
 
 
 def lines_of(text: str) -> tuple[int, ...]:

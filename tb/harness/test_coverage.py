@@ -169,7 +169,7 @@ def test_the_page_names_each_hole(tmp_path):
         {Arm(1, 1, "a[4]:0->1"): 0, Arm(1, 1, "a[3]:1->0"): 0, Arm(1, 1, "a[0]:0->1"): 1},
         {6: "full case"},
     )
-    text = page({"rtl/x/y.sv": one}, {}, {}, ["rtl/z.sv"], "Measured.", tmp_path)
+    text = page({"rtl/x/y.sv": one}, {}, {}, ["rtl/z.sv"], [], "Measured.", tmp_path)
     lines = text.splitlines()
     assert "| `rtl/x` | 1 | 40.0 % of 5 | 33.3 % of 3 | 33.3 % of 3 |" in lines
     at = lines.index("- `rtl/x/y.sv`")
@@ -177,6 +177,16 @@ def test_the_page_names_each_hole(tmp_path):
     assert "- `rtl/z.sv`" in lines
     assert "| `rtl/x/y.sv:6` | full case |" in lines
     assert "- `rtl/x/y.sv`, 2 of 3: `a[4:3]`" in lines
+    assert "Not complete" not in text
+    assert "`tb/x/test_z.py`." in page({}, {}, {}, [], ["tb/x/test_z.py"], "Measured.", tmp_path)
+
+
+def test_no_test_begins_after_the_time(monkeypatch):
+    ran = []
+    monkeypatch.setattr(rtl, "gathered", lambda test: test == BLOCK)
+    monkeypatch.setattr(rtl, "run", lambda test: ran.append(test) or "failed")
+    assert rtl.gather([BLOCK, rtl.RTL], 1) == ["failed"] and ran == [rtl.RTL]
+    assert rtl.gather([rtl.RTL], 1, until=0) == [] and len(ran) == 1
 
 
 def test_totals_are_those_of_all_files():
