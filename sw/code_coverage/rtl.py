@@ -9,6 +9,7 @@ exist, so properties do not count; neither do benches and the soft cores of othe
 
 import ast
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -21,13 +22,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from code_coverage.reached import Arm, Reached
-from twin import netlist
-from twin.build import ROOT, SHORT_RUNS, rtl_path
+from twin.build import ROOT, SHORT_RUNS
 
 RTL = ROOT / "rtl"
 TESTS = ROOT / "tb"
 FOLDER = ROOT / "build" / "coverage" / "rtl"  # a folder for each file of tests
-COMPLETE = "complete"  # file in it: the tests passed with the sources of this digest
+COMPLETE = "complete.json"  # file in it: the tests passed, with these contents of their sources
 ARMS = ("elsif", "case")  # that Verilator counts as lines, and are branches
 LONGEST_S = 3 * 3600  # of a file of tests
 SIMULATES = re.compile(r"^from tb(\.bench import (.*|\([^)]*)\brun\b| import bench$)", re.MULTILINE)
@@ -66,24 +66,30 @@ def imported(test: Path) -> set[Path]:
     return found
 
 
-def digest(test: Path) -> str:
-    """A name for all sources that decide the counts of a file of tests."""
-    total = hashlib.sha256((ROOT / "requirements.lock").read_bytes())
-    sources = {path for path in netlist.parts(test, rtl_path()) if path.suffix != ".py"}
-    for path in sorted(imported(test) | sources):
-        total.update(path.name.encode() + path.read_bytes())
-    return total.hexdigest()
+def contents(path: Path) -> str:
+    """A name for the contents of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
+def versions(test: Path, blocks: Iterable[Path]) -> dict[str, str]:
+    """{path: contents} of what decides the counts of a file of tests of these blocks."""
+    paths = {ROOT / "requirements.lock", *imported(test), *blocks}
+    return {str(path.relative_to(ROOT)): contents(path) for path in sorted(paths)}
 
 
 def gathered(test: Path) -> bool:
     """Whether the counts of a file of tests are there, and of these sources."""
     stamp = folder_of(test) / COMPLETE
-    return stamp.exists() and stamp.read_text() == digest(test)
+    if not stamp.exists():
+        return False
+    then: dict[str, str] = json.loads(stamp.read_text())
+    blocks = [ROOT / name for name in then if name.endswith(".sv")]
+    return then == versions(test, blocks)
 
 
 def run(test: Path) -> str:
     """Run a file of tests. Returns the last lines of what went wrong, or nothing."""
-    now, folder = digest(test), folder_of(test)
+    before, folder = versions(test, RTL.rglob("*.sv")), folder_of(test)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     done = subprocess.run(
@@ -97,7 +103,9 @@ def run(test: Path) -> str:
     )
     if done.returncode:
         return f"{test.relative_to(ROOT)}: {done.stdout[-500:].strip()}"
-    (folder / COMPLETE).write_text(now)
+    used = reached(folder.glob("*.dat"))
+    stamp = {n: v for n, v in before.items() if not n.endswith(".sv") or n in used}
+    (folder / COMPLETE).write_text(json.dumps(stamp, indent=1))
     return ""
 
 

@@ -97,17 +97,32 @@ def test_the_tests_of_all_blocks_are_found():
     assert not {"test_s0_stage.py", "test_planner.py"} & names
 
 
-def test_a_change_of_a_block_below_makes_the_counts_stale(monkeypatch, tmp_path):
-    test = rtl.TESTS / "serial" / "test_uart_rx.py"
-    before, timer = rtl.digest(test), tmp_path / "bit_timer.sv"
-    parts = rtl.netlist.parts
-    timer.write_text("module bit_timer; endmodule")
+def test_counts_hold_until_a_source_of_the_tests_changes(monkeypatch, tmp_path):
+    monkeypatch.setattr(rtl, "FOLDER", tmp_path)
+    test, other = rtl.TESTS / "serial" / "test_half_duplex.py", rtl.RTL / "serial" / "uart_rx.sv"
+    changed = set()
+    contents = rtl.contents
+    monkeypatch.setattr(rtl, "contents", lambda path: "" if path in changed else contents(path))
 
-    def changed(source, folders):
-        return {timer if path.name == timer.name else path for path in parts(source, folders)}
+    def passed(command, **options):
+        folder = rtl.Path(options["env"]["RTL_COVERAGE"])
+        written(folder / "a.dat", (key(7, "branch", "if", "7"), 1))
+        return subprocess.CompletedProcess(command, len(changed), "1 failed", "")
 
-    monkeypatch.setattr(rtl.netlist, "parts", changed)
-    assert rtl.digest(test) != before
+    monkeypatch.setattr(rtl.subprocess, "run", passed)
+    assert not rtl.gathered(test)
+    assert rtl.run(test) == "" and rtl.gathered(test)
+    for source, depends in (
+        (BLOCK, True),
+        (test, True),
+        (rtl.TESTS / "bench.py", True),
+        (other, False),
+    ):
+        changed.add(source)
+        assert rtl.gathered(test) is not depends
+        changed.clear()
+    changed.add(other)
+    assert rtl.run(test).endswith("1 failed") and not rtl.gathered(test)
 
 
 def test_the_models_that_a_test_imports_are_found():
