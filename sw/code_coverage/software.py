@@ -21,70 +21,75 @@ from code_coverage.reached import Arm, Reached, merged
 from twin.build import ROOT
 from twin.compiled.host_library import COVERAGE
 
-FOLDER = ROOT / "build" / "coverage" / "software"
+FOLDER = ROOT / "build" / "coverage" / "software"  # a folder for each folder of tests
 FIRMWARE = ROOT / "sw" / "firmware"
 HOST = ROOT / "sw" / "host"
 TESTS = [ROOT / "tb" / name for name in ("firmware", "host")]
-DEPENDS = [*TESTS, ROOT / "tb" / "fakes", FIRMWARE, HOST, ROOT / "sw" / "twin" / "compiled"]
-COMPLETE = "complete"  # file: the tests passed with the sources of this digest
+DEPENDS = [ROOT / "tb" / "fakes", FIRMWARE, HOST, ROOT / "sw" / "twin" / "compiled"]
+COMPLETE = "complete"  # file in it: the tests passed with the sources of this digest
+NOTES = "gcov"  # folder in it: notes and counts of gcc
+COUNTS = "host"  # how the names of the files of coverage.py begin
 LONGEST_S = 3 * 3600
 
 
-def digest() -> str:
-    """A name for all sources that decide the counts."""
-    lock = ROOT / "requirements.lock"
-    files = (path for folder in DEPENDS for path in sorted(folder.rglob("*.*")) if path.is_file())
+def digest(tests: Path) -> str:
+    """A name for all sources that decide the counts of a folder of tests."""
+    folders = (tests, *DEPENDS)
+    files = (path for folder in folders for path in sorted(folder.rglob("*.*")) if path.is_file())
     total = hashlib.sha256()
-    for path in (lock, *files):
+    for path in (ROOT / "requirements.lock", *files):
         if path.suffix not in (".pyc", ".so"):
             total.update(path.name.encode() + path.read_bytes())
     return total.hexdigest()
 
 
+def folder_of(tests: Path) -> Path:
+    """Where the counts of a folder of tests are."""
+    return FOLDER / tests.name
+
+
 def run(tests: Path) -> str:
-    """Run the tests of a folder. Returns the last lines of what went wrong, or nothing."""
-    command = [sys.executable, "-m", "coverage", "run", "-m", "pytest"]
-    done = subprocess.run(
-        [*command, "-q", "-p", "no:cacheprovider", str(tests)],
+    """Run the tests of a folder, unless their counts are there. Returns the last lines of what went
+    wrong, or nothing.
+    """
+    now, folder = digest(tests), folder_of(tests)
+    stamp = folder / COMPLETE
+    if stamp.exists() and stamp.read_text() == now:
+        return ""
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / NOTES).mkdir(parents=True)
+    done = coverage(
+        folder / COUNTS,
+        *("run", "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests)),
+        **{COVERAGE: str(folder / NOTES)},
+    )
+    if done.returncode:
+        return f"{tests.name}: {done.stdout[-500:].strip()}"
+    stamp.write_text(now)
+    return ""
+
+
+def gather(jobs: int) -> list[str]:
+    """Run the tests whose counts are missing. Returns what went wrong."""
+    with ThreadPoolExecutor(jobs) as pool:
+        faults = [fault for fault in pool.map(run, TESTS) if fault]
+    if not faults:
+        folders = [str(folder_of(tests)) for tests in TESTS]
+        coverage(FOLDER / COUNTS, "combine", "--keep", *folders).check_returncode()
+        coverage(FOLDER / COUNTS, "json", "-q", "-o", str(FOLDER / "host.json")).check_returncode()
+    return faults
+
+
+def coverage(data: Path, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
+    """A command of coverage.py with this file of counts, and more in its environment."""
+    return subprocess.run(
+        [sys.executable, "-m", "coverage", *words],
         cwd=ROOT,
-        env={
-            **os.environ,
-            COVERAGE: str(FOLDER / "gcov"),
-            "COVERAGE_FILE": str(FOLDER / "host"),
-        },
+        env={**os.environ, "COVERAGE_FILE": str(data), **more},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
         timeout=LONGEST_S,
-    )
-    return f"{tests.name}: {done.stdout[-500:].strip()}" if done.returncode else ""
-
-
-def gather(jobs: int) -> list[str]:
-    """Run all tests, unless their counts are there. Returns what went wrong."""
-    now, stamp = digest(), FOLDER / COMPLETE
-    if stamp.exists() and stamp.read_text() == now:
-        return []
-    shutil.rmtree(FOLDER, ignore_errors=True)
-    (FOLDER / "gcov").mkdir(parents=True)
-    with ThreadPoolExecutor(jobs) as pool:
-        faults = [fault for fault in pool.map(run, TESTS) if fault]
-    if not faults:
-        coverage("combine", "--keep")
-        coverage("json", "-q", "-o", str(FOLDER / "host.json"))
-        stamp.write_text(now)
-    return faults
-
-
-def coverage(*words: str) -> None:
-    """Call a command of coverage.py on the counts of the host package."""
-    subprocess.run(
-        [sys.executable, "-m", "coverage", *words],
-        cwd=ROOT,
-        env={**os.environ, "COVERAGE_FILE": str(FOLDER / "host")},
-        stdin=subprocess.DEVNULL,
-        check=True,
-        capture_output=True,
     )
 
 
@@ -125,7 +130,9 @@ def excluded(found: dict[str, Reached]) -> dict[str, Reached]:
 
 def firmware() -> dict[str, Reached]:
     """{path of a source: what was reached} of the firmware."""
-    return excluded(merged(of_notes(notes) for notes in sorted((FOLDER / "gcov").glob("*.gcno"))))
+    folders = [folder_of(tests) / NOTES for tests in TESTS]
+    notes = [path for folder in folders for path in sorted(folder.glob("*.gcno"))]
+    return excluded(merged(of_notes(path) for path in notes))
 
 
 def host() -> dict[str, Reached]:
