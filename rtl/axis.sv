@@ -147,7 +147,8 @@ module axis #(
     end
 
     // requests
-    wire control_enable, control_homing, control_fine;
+    wire [1:0] control_enable, control_homing;  // each holds if both of its bits are 1
+    wire control_fine;
     wire strobes_reset_faults, strobes_start;
     // settings of the feedback channel
     wire [5:0] deglitch;
@@ -343,9 +344,9 @@ module axis #(
             .clk,
             .rst,
             // requests
-            .enable_request  (control_enable),
+            .enable_request  (&control_enable),
             .closed_loop     (check_following),
-            .homing          (control_homing),
+            .homing          (&control_homing),
             .reset_faults    (strobes_reset_faults),
             // causes
             .limit_low,

@@ -20,12 +20,12 @@ module axis_registers #(
     input  wire         [ 5:0] word,                            // index of the word
     input  wire         [31:0] wdata,                           // value to write
     output logic        [31:0] rdata,                           // live bits read; else 0
-    // requests the drive; the interlock grants it only without a latched fault
-    output logic               control_enable,
+    // 3 requests the drive; the interlock grants it only without a latched fault
+    output logic        [ 1:0] control_enable,
     // 1: the servo commands the drive, 0: open_command does
     output logic               control_closed_loop,
-    // homing; 1: a limit switch only blocks motion towards it, 0: it is a fault
-    output logic               control_homing,
+    // homing; 3: a limit switch only blocks motion towards it, else it is a fault
+    output logic        [ 1:0] control_homing,
     // 1: the fine stage holds; the main command keeps its value. 0: the fine stage returns to its
     // middle
     output logic               control_fine,
@@ -210,10 +210,10 @@ module axis_registers #(
         if (get_position) position_high <= position[47:32];
         if (get_target) target_high <= target[47:32];
 
-        if (HAS_DRIVE != 0 && put && word == 6'h00) control_enable <= wdata[0];
-        if (HAS_DRIVE != 0 && put && word == 6'h00) control_closed_loop <= wdata[1];
-        if (HAS_DRIVE != 0 && put && word == 6'h00) control_homing <= wdata[2];
-        if (HAS_DRIVE != 0 && put && word == 6'h00) control_fine <= wdata[3];
+        if (HAS_DRIVE != 0 && put && word == 6'h00) control_enable <= wdata[1:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h00) control_closed_loop <= wdata[2];
+        if (HAS_DRIVE != 0 && put && word == 6'h00) control_homing <= wdata[4:3];
+        if (HAS_DRIVE != 0 && put && word == 6'h00) control_fine <= wdata[5];
         strobes_reset_faults <= put && word == 6'h01 && wdata[0];
         strobes_set_target_to_position <= put && word == 6'h01 && wdata[1];
         strobes_start <= put && word == 6'h01 && wdata[2];
@@ -270,9 +270,9 @@ module axis_registers #(
             get_built <= 1'b0;
             get_following_error <= 1'b0;
             get_command <= 1'b0;
-            control_enable <= 1'b0;
+            control_enable <= 2'h0;
             control_closed_loop <= 1'b0;
-            control_homing <= 1'b0;
+            control_homing <= 2'h0;
             control_fine <= 1'b0;
             strobes_reset_faults <= 1'b0;
             strobes_set_target_to_position <= 1'b0;

@@ -116,7 +116,7 @@ module register_layout #(
             9'h040, 9'h08A, 9'h08F, 9'h100: mask = 32'h000FFFFF;
             9'h050, 9'h102: mask = 32'h000000FF;
             9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
-            9'h0C0: mask = (has_drive ? 32'h0000000F : 32'd0);
+            9'h0C0: mask = (has_drive ? 32'h0000003F : 32'd0);
             9'h0C8, 9'h0ED, 9'h0EF, 9'h0F0, 9'h0F2, 9'h0F3, 9'h0F5, 9'h0F6, 9'h0F7: mask =
                 (has_drive ? 32'hFFFFFFFF : 32'd0);
             9'h0D1: mask = 32'h0000003F | (has_sine ? 32'hFFFF0000 : 32'd0);

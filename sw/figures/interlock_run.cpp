@@ -262,7 +262,8 @@ struct Campaign {
                 enable = random.one_in(2);
                 // not homing: there a switch is no cause
                 const uint32_t others = ~AXIS_CONTROL_ENABLE_MASK & ~AXIS_CONTROL_HOMING_MASK;
-                b.put(AXIS_CONTROL, (uint32_t(random.below(16)) & others) | enable);
+                b.put(AXIS_CONTROL, (uint32_t(random.below(64)) & others) |
+                                        (enable ? AXIS_CONTROL_ENABLE_MASK : 0));
             }
             // while its cause persists a level cannot be reset
             const bool resets = (level || enable) && random.one_in(2);

@@ -24,7 +24,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from firmware import build as firmware_build
-from twin import netlist, rising_edge, statements
+from twin import netlist, registers, rising_edge, statements
 from twin.parameters import tables as parameters
 
 HERE = Path(__file__).resolve().parent
@@ -411,7 +411,9 @@ def verilate_node(
             "has node_memory been renamed?"
         )
     try:
-        evaluation = rising_edge.function(rising_edge.Design.read(folder))
+        design = rising_edge.Design.read(folder)
+        evaluation = rising_edge.function(design)
+        registers_of_node = registers.header(folder, design)
     except statements.FormError as error:
         raise BuildError(
             f"Verilator's code is not as sw/twin/rising_edge.py expects: {error}"
@@ -423,7 +425,7 @@ def verilate_node(
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
         f"constexpr bool SERIAL_CORE = {'true' if values.get('HAS_SERIAL_CORE') else 'false'};\n"
-        f"#define NODE_MEMORY {words[0]}\n{evaluation}"
+        f"#define NODE_MEMORY {words[0]}\n{evaluation}{registers_of_node}"
     )
 
 
@@ -465,7 +467,9 @@ def verilate_netlist(
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
         "constexpr bool SERIAL_CORE = false;\n"
-        "struct Rest {};  // nothing of a netlist rests\n"
+        "struct Rest {  // nothing of a netlist rests\n    void forget() {}\n};\n"
+        '#include "nodes/registers.h"\n'
+        "const std::vector<twin::Register> REGISTERS;  // its cells have no names\n"
         "inline void rising_edge(Vnode___024root& pins, Rest&) {\n"
         "    for (int level = 0; level < 2; level++) {\n"
         "        pins.clk = level;\n"

@@ -394,6 +394,9 @@ class Edges:
             yield from (f"decltype({ROOT}::{name}) before_{n}_{name};" for name in self.before(n))
             inputs = sorted(rest.logic_inputs)
             yield from (f"{self.types[name]} input_{n}_{name};" for name in inputs)
+        # for a caller that has changed a register by itself
+        forgets = " ".join(f"known_{n} = false;" for n in range(len(self.rests)))
+        yield f"void forget() {{ {forgets} }}"
 
     def after_logic(self, number: int) -> Plain:
         """Refuses, or stores the logic inputs of what rests."""

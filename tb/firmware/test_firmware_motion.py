@@ -76,6 +76,30 @@ def test_a_busy_soft_core_does_not_starve_a_short_move():
         assert finish(machine) == "ok"
 
 
+@pytest.mark.parametrize("flipped", [1, 1 << 16, -(1 << 17)])
+def test_a_motion_whose_target_is_wrong_at_its_end_is_reported(flipped):
+    machine = homed(settle_time=50)
+    axis = machine.axes[0]
+    machine.ask("move", axis=0, target=100 * PERIOD)
+    assert machine.run(2000, until=lambda: machine.status()["state"] == "settling")
+    axis.player.target += flipped << 24
+    assert finish(machine) == "not_settled"
+    machine.ask("move", axis=0, target=0)
+    assert finish(machine) == "ok" and axis.target == 0
+
+
+def test_requests_and_the_time_of_the_watchdog_are_written_in_each_round():
+    machine = homed(watchdog_time=70)
+    axis, time = machine.axes[0], DEFINES["BUS_BASE"] + DEFINES["BUS_WATCHDOG_TIME"]
+    right = axis.control
+    assert right & ENABLE and machine.word[time] == 70
+    for bit in range(16):
+        axis.word[DEFINES["AXIS_CONTROL"]] ^= 1 << bit
+        machine.word[time] ^= 1 << bit
+        machine.poll()
+        assert axis.control == right and machine.word[time] == 70
+
+
 # another target in flight
 
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // rising_edge_run -- two nodes with the same pins and firmware, one evaluated by Verilator, one by
 // rising_edge(); stops at the first cycle after which a register, a memory or an output differs.
+// Near the end, random bits of the registers and memories flip in both.
 //
 //   rising_edge_run FIRMWARE CYCLES SEED      FIRMWARE: words in hex, one a line
 #include <cstdio>
@@ -18,6 +19,8 @@
 constexpr unsigned LIVELY = 64, QUIET = 65536;
 constexpr uint64_t RESET_CYCLES = 16;   // at the beginning
 constexpr uint64_t MEMORY_CYCLES = 97;  // from one look at the memories to the next
+constexpr uint64_t FLIPPED = 50'000;    // cycles at the end in which bits flip
+constexpr unsigned FLIP = 500;          // cycles from one flip to the next, on average
 
 static void cycle(Vnode& node) {
     node.clk = 1;
@@ -41,7 +44,7 @@ int main(int count, char** arguments) {
     std::string word;
     for (int n = 0; firmware >> word; n++)
         a.NODE_MEMORY[n] = b.NODE_MEMORY[n] = uint32_t(std::stoul(word, nullptr, 16));
-    uint64_t driving = 0, rested = 0;
+    uint64_t driving = 0, rested = 0, flips = 0;
     for (uint64_t n = 0; n < cycles; n++) {
 #define SET(name, mask)                                    \
     if (random() % (n < cycles / 2 ? LIVELY : QUIET) == 0) \
@@ -62,10 +65,22 @@ int main(int count, char** arguments) {
         if (n % MEMORY_CYCLES == 0 || n + 1 == cycles) {
             MEMORIES(COMPARE)
         }
+        if (cycles - n < FLIPPED && random() % FLIP == 0) {
+            const auto& where = REGISTERS[random() % REGISTERS.size()];
+            const unsigned at = random() % where.words, bit = random() % where.bits;
+            twin::flip(a, where, at, bit);
+            twin::flip(b, where, at, bit);
+            Vnode___024root___eval_settle(&a);
+            Vnode___024root___eval_settle(&b);
+            rest.forget();
+            flips++;
+        }
         driving += a.rs485_driver_enable;
         rested += rest.known_0;
     }
-    std::printf("the same for %llu cycles; the node drove the bus in %llu, and rested in %llu\n",
-                (unsigned long long)cycles, (unsigned long long)driving,
-                (unsigned long long)rested);
+    std::printf(
+        "the same for %llu cycles, with %llu flips; the node drove the bus in %llu, and "
+        "rested in %llu\n",
+        (unsigned long long)cycles, (unsigned long long)flips, (unsigned long long)driving,
+        (unsigned long long)rested);
 }

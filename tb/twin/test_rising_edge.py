@@ -175,7 +175,7 @@ def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes
     (tmp_path / "signals.h").write_text(signals(tmp_path))
     (tmp_path / "firmware").write_text("\n".join(f"{w:x}" for w in build.firmware(axes=axes)))
     flags = [*build.compile_flags(), *build.VERILATED]
-    include = [f"-I{tmp_path}", f"-I{verilator / 'include'}"]
+    include = [f"-I{tmp_path}", f"-I{build.HERE}", f"-I{verilator / 'include'}"]
     driver = Path(__file__).with_name("rising_edge_run.cpp")
     program = tmp_path / "run"
     command = [tool, *flags, *include, driver, build.runtime(tool, verilator), "-o", program]
@@ -183,6 +183,7 @@ def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes
     seed = os.environ.get("SEED", random.getrandbits(31))
     print(f"SEED={seed}")
     output = build.run([program, tmp_path / "firmware", cycles, seed], "run of both")
-    assert output.startswith(f"the same for {cycles} cycles")
+    assert output.startswith(f"the same for {cycles} cycles, with ")
+    assert int(re.search(r"(\d+) flips", output)[1]) > 50
     # how much it rests is a matter of the seed's requests
     assert int(output.split()[-1]) > (cycles - axes * WAITS_FROM) / 5, "it rested too seldom"

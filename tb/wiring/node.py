@@ -199,7 +199,7 @@ class Node(Bench):
 
     def enable(self, axis, **control):
         """Request the drive of an axis."""
-        self.write("axis.control", enable=1, axis=axis, **control)
+        self.write("axis.control", enable=3, axis=axis, **control)
         self.run(4)
 
     def reset_faults(self, axis):

@@ -99,7 +99,7 @@ def test_a_limit_switch_stops_its_axis_and_its_position_is_latched(node, axis):
 @pytest.mark.parametrize("axis", [0, 1])
 def test_while_homing_a_limit_switch_is_no_fault(node, axis):
     both_on(node)
-    node.enable(axis, homing=1)
+    node.enable(axis, homing=3)
     node.set_bit("limit_low_open", axis, 1)
     node.set_bit("limit_high_open", axis, 1)
     node.run(LIMIT)
@@ -112,7 +112,7 @@ def test_a_pressed_switch_blocks_the_command_into_it_and_no_other(node):
     both_on(node)
     for axis in (0, 1):
         node.write("axis.open_command", 16000, axis=axis)
-        node.enable(axis, homing=1)
+        node.enable(axis, homing=3)
     node.ticks(3)
     for sign, pin in ((1, "limit_high_open"), (-1, "limit_low_open")):
         for axis in (0, 1):

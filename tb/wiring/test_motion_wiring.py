@@ -346,7 +346,7 @@ def test_a_pressed_switch_stops_the_steps_into_it(node):
     for axis, (sign, pin) in enumerate(((1, "limit_high_open"), (-1, "limit_low_open"))):
         node.write("actuator.drive", 1, axis=axis)
         node.write("actuator.step_ratio", 40 << 32, axis=axis)
-        node.enable(axis, homing=1)
+        node.enable(axis, homing=3)
         node.ticks(3)
         play(node, axis, sign * 0x2000, 4)
         node.ticks(8)

@@ -123,10 +123,8 @@ void axis_poll(unsigned n) {
     if (!HARDWARE_DRIVES || a->state == BUS_STATE_OFF || a->state == BUS_STATE_FAULTED) return;
     motion_feed(n);
     state = axis_read(n, AXIS_STATE);  // read last, so that homing sees the present state
-    if (a->leaving && !pressed(state)) {
-        a->leaving = false;
-        write_control(n, true);
-    }
+    if (a->leaving && !pressed(state)) a->leaving = false;
+    write_control(n, true);  // in each round, since a bit of it may have flipped
     switch (a->state) {
     case BUS_STATE_HOMING:
         outcome = homing_poll(n, state);
@@ -144,6 +142,8 @@ void axis_poll(unsigned n) {
     case BUS_STATE_SETTLING:
         hold(n);
         outcome = motion_settle(n, parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW));
+        // plans are exact: another end means that a bit flipped, in the plan or on its way
+        if (outcome == BUS_CAUSE_OK && !motion_complete(n)) outcome = BUS_CAUSE_NOT_SETTLED;
         if (outcome != BUS_CAUSE_RUNNING) finish(n, outcome);
         break;
     case BUS_STATE_STOPPING:

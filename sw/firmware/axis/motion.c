@@ -23,7 +23,7 @@ static const uint16_t plan_kilocycles[] = {300, 800};
 
 static struct motion {
     struct plan plan;
-    int64_t from;           // target when the plan began
+    int64_t from, to;       // target when the plan began, and at its end
     uint8_t queued[QUEUE];  // ticks of the last pieces that were queued
     uint8_t pieces;         // number of pieces queued so far
     bool inside;            // the error has been inside the window since inside_ms
@@ -115,6 +115,7 @@ uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id) {
     struct plan* plan = &motions[n].plan;
     bool planned;
     motions[n].from = axis_read_position(n, AXIS_TARGET);
+    motions[n].to = motions[n].from + distance;
     if (parameters_get(n, BUS_PARAMETER_PROFILE) == STEPPED) {
         struct planner_stepped_profile stepped = parameters_stepped_profile(n, velocity_id);
         planned = planner_stepped_move(plan, &stepped, distance);
@@ -146,6 +147,7 @@ uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id) {
         }
         if (next.join == 0) continue;  // the old plan was fed beyond the join
         next.ready = true;
+        motions[n].to = target;
         motion_feed(n);
         return BUS_CAUSE_OK;
     }
@@ -171,6 +173,8 @@ bool motion_inside(unsigned n, int64_t window) {
     int64_t error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR);
     return error <= window && error >= -window;
 }
+
+bool motion_complete(unsigned n) { return axis_read_position(n, AXIS_TARGET) == motions[n].to; }
 
 void motion_settle_begin(unsigned n) {
     motions[n].inside = false;

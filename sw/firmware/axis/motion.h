@@ -27,6 +27,7 @@ uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id);
 uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id);
 
 bool motion_played(unsigned n);     // the player is at rest and no piece is left
+bool motion_complete(unsigned n);   // the target is exactly where the plan ends
 uint32_t motion_ticks(unsigned n);  // duration of the motion that was planned last
 
 // Settling: the error must stay inside the window for settle_time.

@@ -143,6 +143,8 @@ static void apply_watchdog(unsigned axis) {
     bus_write(BUS_WATCHDOG_TIME, (uint32_t)parameters[axis][BUS_PARAMETER_WATCHDOG_TIME]);
 }
 
+void parameters_refresh(void) { apply_watchdog(0); }
+
 static void write_filter(unsigned axis, uint32_t filter, uint32_t number, uint32_t value) {
     axis_write(axis, AXIS_FILTER_ADDRESS, filter * 8 + number);
     axis_write(axis, AXIS_FILTER_VALUE, value);

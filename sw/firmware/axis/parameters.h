@@ -30,6 +30,9 @@ void parameters_set(unsigned axis, uint8_t id, int64_t value);
 int64_t parameters_get(unsigned axis, uint8_t id);
 int64_t parameters_default(uint8_t id);
 
+// Writes the bus watchdog's time again, since a bit of it may have flipped.
+void parameters_refresh(void);
+
 // Limits of a motion whose velocity is limited by the parameter `velocity_id`.
 struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id);
 struct planner_stepped_profile parameters_stepped_profile(unsigned axis, uint8_t velocity_id);

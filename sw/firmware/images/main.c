@@ -35,6 +35,7 @@ void firmware_poll(void) {
         bus_poll();
     }
     if (axes == 0) return;
+    parameters_refresh();
     for (unsigned part = 0; part < image_part_count; part++) {
         if (!image_parts[part].work) continue;
         image_parts[part].work();

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xbbfab873u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x993b7497u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -543,24 +543,25 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define PERIPHERALS_EDM_STATUS_FELL_1_WIDTH 1
 
 // axis: position, servo, profile, drive-enable interlock
-// rw: requests; the interlock decides
+// rw: requests; the interlock decides; a field of two bits holds if both are 1, so no single
+// flipped bit switches on
 #define AXIS_CONTROL 0x000u
-// requests the drive; the interlock grants it only without a latched fault
-#define AXIS_CONTROL_ENABLE_MASK 0x00000001u
+// 3 requests the drive; the interlock grants it only without a latched fault
+#define AXIS_CONTROL_ENABLE_MASK 0x00000003u
 #define AXIS_CONTROL_ENABLE_SHIFT 0
-#define AXIS_CONTROL_ENABLE_WIDTH 1
+#define AXIS_CONTROL_ENABLE_WIDTH 2
 // 1: the servo commands the drive, 0: open_command does
-#define AXIS_CONTROL_CLOSED_LOOP_MASK 0x00000002u
-#define AXIS_CONTROL_CLOSED_LOOP_SHIFT 1
+#define AXIS_CONTROL_CLOSED_LOOP_MASK 0x00000004u
+#define AXIS_CONTROL_CLOSED_LOOP_SHIFT 2
 #define AXIS_CONTROL_CLOSED_LOOP_WIDTH 1
-// homing; 1: a limit switch only blocks motion towards it, 0: it is a fault
-#define AXIS_CONTROL_HOMING_MASK 0x00000004u
-#define AXIS_CONTROL_HOMING_SHIFT 2
-#define AXIS_CONTROL_HOMING_WIDTH 1
+// homing; 3: a limit switch only blocks motion towards it, else it is a fault
+#define AXIS_CONTROL_HOMING_MASK 0x00000018u
+#define AXIS_CONTROL_HOMING_SHIFT 3
+#define AXIS_CONTROL_HOMING_WIDTH 2
 // 1: the fine stage holds; the main command keeps its value. 0: the fine stage returns to its
 // middle
-#define AXIS_CONTROL_FINE_MASK 0x00000008u
-#define AXIS_CONTROL_FINE_SHIFT 3
+#define AXIS_CONTROL_FINE_MASK 0x00000020u
+#define AXIS_CONTROL_FINE_SHIFT 5
 #define AXIS_CONTROL_FINE_WIDTH 1
 // w: strobes
 #define AXIS_STROBES 0x004u

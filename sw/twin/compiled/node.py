@@ -169,10 +169,15 @@ class Axis:
         """The control register."""
         return self.word.get(DEFINES["AXIS_CONTROL"], 0)
 
+    def requests(self, field: str) -> bool:
+        """Whether all bits of a field of the control register are 1."""
+        mask = DEFINES[f"AXIS_CONTROL_{field}_MASK"]
+        return self.control & mask == mask
+
     def interlock(self, strobe_cause: int = 0) -> int:
         """Latch the faults whose causes are present, and switch the drive; returns those causes."""
         causes = self.causes | strobe_cause
-        if not self.control & DEFINES["AXIS_CONTROL_HOMING_MASK"]:
+        if not self.requests("HOMING"):
             causes |= (
                 FAULT["limit_low"] * self.pressed_low | FAULT["limit_high"] * self.pressed_high
             )
@@ -180,17 +185,17 @@ class Axis:
         loops = DEFINES["AXIS_CONTROL_CLOSED_LOOP_MASK"] | DEFINES["AXIS_CONTROL_FINE_MASK"]
         if self.enabled and self.control & loops and limit and abs(self.error) > limit:
             causes |= FAULT["following_error"]
-        enable = self.control & DEFINES["AXIS_CONTROL_ENABLE_MASK"]
+        enable = self.requests("ENABLE")
         arrived = causes & (-1 if enable else ALWAYS_LATCHED)
         if arrived and not self.faults:
             self.first_fault, self.fault_position = arrived & -arrived, self.position
         self.faults |= arrived
-        self.enabled = bool(enable) and not self.faults
+        self.enabled = enable and not self.faults
         return causes
 
     def reset(self) -> None:
         """Reset the faults whose causes are gone, while the drive is disabled."""
-        if not self.control & DEFINES["AXIS_CONTROL_ENABLE_MASK"]:
+        if not self.requests("ENABLE"):
             self.faults &= self.interlock()
             if not self.faults:
                 self.first_fault = 0

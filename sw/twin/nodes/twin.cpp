@@ -52,10 +52,26 @@ class Core {  // a Verilated node and its clock
         pins.rst = 0;
     }
     ~Core() { model_->final(); }
+    uint64_t digest() const {  // of all registers and memories, FNV-1a
+        const auto* all = reinterpret_cast<const uint8_t*>(&pins);
+        uint64_t sum = 0xCBF29CE484222325;
+        for (const Register& one : REGISTERS)
+            for (size_t n = 0; n < one.size * one.words; n++)
+                sum = (sum ^ all[one.offset + n]) * 0x100000001B3;
+        return sum;
+    }
     void clk() {  // not in reset
         rising_edge(pins, rest_);
         if (SERIAL_CORE)
             pins.flash_miso = flash_->clk(pins.flash_cs_n, pins.flash_sclk, pins.flash_mosi);
+    }
+    // Flips a bit of a register; false if it is logic after all, which has its level again.
+    bool flip(const Register& where, unsigned word, unsigned bit) {
+        const bool before = bit_of(pins, where, word, bit);
+        twin::flip(pins, where, word, bit);
+        Vnode___024root___eval_settle(&pins);
+        rest_.forget();
+        return bit_of(pins, where, word, bit) != before;
     }
 
  private:
@@ -106,6 +122,10 @@ class Node {
     void hear_peer(bool level) {
         if (core_) core_->pins.peer_rx = level;
     }
+    bool flip(const Register& where, unsigned word, unsigned bit) {
+        return core_ && core_->flip(where, word, bit);
+    }
+    uint64_t digest() const { return core_ ? core_->digest() : 0; }
     void press_estop(bool pressed) {
         estop_ = pressed;
         if (core_) core_->pins.estop_open = pressed;
@@ -148,6 +168,13 @@ class Node {
     bool estop_ = false;
 };
 
+struct Flip {  // of a bit, after a cycle
+    uint64_t at = NEVER;
+    size_t node = 0, register_ = 0;
+    unsigned word = 0, bit = 0;
+    bool made = false;
+};
+
 struct PeerDirection {
     int from, to;
     PeerLine line;
@@ -177,9 +204,12 @@ class Twin {
         for (auto& peer : peers)
             nodes[size_t(peer.to)]->hear_peer(
                 peer.line.step(now, nodes[size_t(peer.from)]->peer_tx()));
+        if (now == flip.at)
+            flip.made = nodes[flip.node]->flip(REGISTERS[flip.register_], flip.word, flip.bit);
     }
 
     uint64_t now = 0;
+    Flip flip;
     Bus bus;
     std::vector<std::unique_ptr<Node>> nodes;
     std::deque<PeerDirection> peers;  // at fixed addresses
@@ -327,6 +357,21 @@ void* twin_attach_devices(Twin* t, int node, const DevicesParameters* parameters
         };
     return devices.get();
 }
+// Name, bits and words of a register of the nodes, in the order of their numbers; null beyond the
+// last one.
+const char* twin_register(int number, int* shape) {
+    if (size_t(number) >= REGISTERS.size()) return nullptr;
+    const Register& one = REGISTERS[size_t(number)];
+    shape[0] = int(one.bits);
+    shape[1] = int(one.words);
+    return one.name;
+}
+// A bit flips after the cycle `at`, which is still to come; one flip at a time.
+void twin_flip_at(Twin* t, uint64_t at, int node, int number, int word, int bit) {
+    t->flip = {at, size_t(node), size_t(number), unsigned(word), unsigned(bit), false};
+}
+int twin_flipped(Twin* t) { return t->flip.made; }  // 0: not yet, or the bit is no flip-flop
+uint64_t twin_digest(Twin* t, int node) { return t->nodes[size_t(node)]->digest(); }
 // One direction of the serial line between two nodes; its functions are peer_line_*.
 void* twin_join_peers(Twin* t, int from, int to, uint64_t seed, double baud) {
     t->peers.push_back({from, to, PeerLine(seed, 0x9EE2u + unsigned(from), CLK_HZ, baud)});

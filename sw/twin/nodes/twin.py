@@ -103,6 +103,10 @@ FUNCTIONS: Functions = {
     "twin_attach_devices": (HANDLE, [HANDLE, WHOLE, HANDLE, ctypes.c_uint, LONG, WHOLE]),
     "twin_join_peers": (HANDLE, [HANDLE, WHOLE, WHOLE, LONG, REAL]),
     "twin_power": (None, [HANDLE, WHOLE, WHOLE]),
+    "twin_register": (ctypes.c_char_p, [WHOLE, HANDLE]),
+    "twin_flip_at": (None, [HANDLE, LONG, WHOLE, WHOLE, WHOLE, WHOLE]),
+    "twin_flipped": (WHOLE, [HANDLE]),
+    "twin_digest": (LONG, [HANDLE, WHOLE]),
     "frame_bench_new": (HANDLE, [WHOLE, HANDLE, WHOLE, REAL]),
     "frame_bench_delete": (None, [HANDLE]),
     "frame_bench_idle": (None, [HANDLE, LONG]),
@@ -126,6 +130,16 @@ class Node:
     address: int
     axes: list[Axis] = field(default_factory=lambda: [Axis()])
     devices: Devices | None = None
+
+
+@dataclass(frozen=True)
+class Register:
+    """A register of a node, a flip-flop or more, or a memory."""
+
+    number: int  # in the library
+    name: str  # the path of its instance and its own name, with dots, from the node downwards
+    bits: int  # of a word
+    words: int  # 1 unless it is a memory
 
 
 @dataclass(frozen=True)
@@ -458,6 +472,41 @@ class Twin:
     def power_on(self, node: int = 0) -> None:
         """The power of a node returns."""
         self.library.twin_power(self.handle, self.check_node(node), True)
+
+    # registers of a node
+
+    def registers(self) -> list[Register]:
+        """All registers and memories of the RTL of a node; none of a netlist, whose cells have no
+        names.
+        """
+        found: list[Register] = []
+        shape = (ctypes.c_int * 2)()
+        while name := self.library.twin_register(len(found), shape):
+            path = name.decode().replace("__BRA__", "[").replace("__KET__", "]")
+            path = path.replace("__DOT__", ".").removeprefix("node.")
+            found.append(Register(len(found), path, *shape))
+        return found
+
+    def flip_after(
+        self, seconds: float, register: Register, bit: int, word: int = 0, node: int = 0
+    ) -> None:
+        """Let a bit of a register of a node change by itself once this time has passed."""
+        if bit not in range(register.bits) or word not in range(register.words):
+            raise IndexError(f"{register.name} has {register.words} words of {register.bits} bits")
+        at = self.library.twin_now(self.handle) + max(1, round(seconds * self.clk_hz))
+        self.library.twin_flip_at(
+            self.handle, at, self.check_node(node), register.number, word, bit
+        )
+
+    def flipped(self) -> bool:
+        """Whether the bit of flip_after has changed: not yet, or never if it is no flip-flop but
+        logic that has its level from others.
+        """
+        return bool(self.library.twin_flipped(self.handle))
+
+    def digest(self, node: int = 0) -> int:
+        """A number of 64 bits that two equal states of all registers and memories share."""
+        return int(self.library.twin_digest(self.handle, self.check_node(node)))
 
     # faults: estop of a node, line_cut of a node or of "host"; all others are of the machine of an
     # axis

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xBBFAB873  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x993B7497  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -605,25 +605,25 @@ FIELDS = (
     ),
     Field(
         "axis", "control", "enable",
-        0x00, 0, 1, False, "rw", "",
+        0x00, 0, 2, False, "rw", "",
         Fraction(1, 1),
-        "requests the drive; the interlock grants it only without a latched fault",
+        "3 requests the drive; the interlock grants it only without a latched fault",
     ),
     Field(
         "axis", "control", "closed_loop",
-        0x00, 1, 1, False, "rw", "",
+        0x00, 2, 1, False, "rw", "",
         Fraction(1, 1),
         "1: the servo commands the drive, 0: open_command does",
     ),
     Field(
         "axis", "control", "homing",
-        0x00, 2, 1, False, "rw", "",
+        0x00, 3, 2, False, "rw", "",
         Fraction(1, 1),
-        "homing; 1: a limit switch only blocks motion towards it, 0: it is a fault",
+        "homing; 3: a limit switch only blocks motion towards it, else it is a fault",
     ),
     Field(
         "axis", "control", "fine",
-        0x00, 3, 1, False, "rw", "",
+        0x00, 5, 1, False, "rw", "",
         Fraction(1, 1),
         "1: the fine stage holds; the main command keeps its value. 0: the fine stage returns "
         "to its middle",
