@@ -112,6 +112,10 @@ SOAK = $(if $(LIST),--list) $(if $(SCHEDULER),--scheduler '$(SCHEDULER)') $(if $
 soak: $(SETUP) $(FIRMWARE)     ## the long campaigns: K=names, SCHEDULER=tcp://… of a cluster, RESULTS=url; docs/campaigns.md
 	@$(PYTHON) -m campaigns.soak $K $(SOAK)
 
+coverage: $(SETUP) $(FIRMWARE) ## what the tests reach of RTL, firmware and host: docs/coverage.md and figures; MINUTES=n
+	@$(PYTHON) -m code_coverage --jobs $(JOBS) $(if $(MINUTES),--minutes $(MINUTES))
+	@$(PYTHON) -m figures.figure coverage_line_pct coverage_branch_pct
+
 BOARDS := $(patsubst constraints/%/board.mk,%,$(wildcard constraints/*/board.mk))
 
 board:            ## the bitstream for a board: BOARD=one of the folders of constraints/
@@ -128,4 +132,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak board clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board clean

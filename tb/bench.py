@@ -5,6 +5,7 @@ SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside t
                                             build/)
 NETLIST=ecp5|ice40     the netlist that Yosys makes of the module, in place of its RTL
 POWER_UP=number        Verilator, with flip-flops and memories that start in this random state
+RTL_COVERAGE=folder    Verilator, which writes a file of coverage counts for each passed test there
 """
 
 import fcntl
@@ -12,6 +13,7 @@ import hashlib
 import os
 import random
 import re
+import shutil
 import xml.etree.ElementTree
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +23,7 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
+from twin import build as twin_build
 from twin import netlist
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -66,9 +69,10 @@ def seed():
     return int(os.environ.get("SEED") or 1)
 
 
-def direct_verilator(runner):
+def direct_verilator(runner, waves):
     """Call the compiler itself: Verilator's Perl front end is not needed, and a minimal system has
-    no Pod::Usage for it.
+    no Pod::Usage for it. Without waves, Verilator's run-time part, most of the compiler's work for
+    a small block, is compiled once for all.
     """
     folder = package("verilator")
     if folder and (folder / "bin" / "verilator_bin").exists():
@@ -76,9 +80,11 @@ def direct_verilator(runner):
         runner._simulator_in_path_build_only = lambda: setattr(
             runner, "executable", str(folder / "bin" / "verilator_bin")
         )
-    os.environ["MAKEFLAGS"] = (
-        "CFG_CXXFLAGS_PCH_I=-include"  # else larger designs miss their precompiled header
-    )
+    flags = ["CFG_CXXFLAGS_PCH_I=-include"]  # else larger designs miss their precompiled header
+    if folder and not waves:
+        runtime = twin_build.runtime(twin_build.compiler(), folder, vpi=True)
+        flags += ["VM_GLOBAL_FAST=", "VM_GLOBAL_SLOW=", f"LOADLIBES={runtime}"]
+    os.environ["MAKEFLAGS"] = " ".join(flags)
 
 
 def run(top, test, **parameters):
@@ -87,9 +93,9 @@ def run(top, test, **parameters):
     under rtl/.
     """
     __tracebackhide__ = True
-    power_up = os.environ.get("POWER_UP")
+    power_up, counts = os.environ.get("POWER_UP"), os.environ.get("RTL_COVERAGE")
     sim, waves, here = (
-        os.environ.get("SIM") or ("verilator" if power_up else "icarus"),
+        os.environ.get("SIM") or ("verilator" if power_up or counts else "icarus"),
         bool(os.environ.get("WAVES")),
         Path(test).resolve(),
     )
@@ -102,7 +108,7 @@ def run(top, test, **parameters):
     if not re.fullmatch(r"[\w.-]{1,100}", tag):
         tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
     family = os.environ.get("NETLIST")
-    kind = "-".join(filter(None, [sim, family, power_up and "power_up"]))
+    kind = "-".join(filter(None, [sim, family, power_up and "power_up", counts and "coverage"]))
     shared = ROOT / "build" / kind / tag
     own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
     own.mkdir(parents=True, exist_ok=True)
@@ -115,12 +121,17 @@ def run(top, test, **parameters):
         sources, args = [], [*args, "-Y.sv", "-Y.v", "-Wall", "-Wno-timescale"]
     else:
         sources, args = [w for w in WAIVERS if w.exists()], [*args, "+libext+.sv+.v", "-Wall"]
-        direct_verilator(runner)
+        direct_verilator(runner, waves)
     if family:
         sources, source, args = of_netlist(sim, family, source, parameters)
     if power_up:
         assert sim == "verilator", "Icarus has no random states: POWER_UP needs Verilator"
         args = [*args, "--x-initial", "unique", "--x-assign", "unique"]
+    plusargs = RANDOM_STATE + [f"+verilator+seed+{power_up}"] if power_up else []
+    if counts:
+        assert sim == "verilator", "only Verilator counts coverage"
+        args = [*args, "--coverage-line", "--coverage-toggle"]
+        plusargs.append(f"+verilator+coverage+file+{own / 'coverage.dat'}")
     with open(shared / "lock", "w") as lock:  # parallel workers may want the same build
         fcntl.flock(lock, fcntl.LOCK_EX)
         runner.build(
@@ -149,7 +160,7 @@ def run(top, test, **parameters):
                 test_dir=own,
                 seed=number,
                 waves=waves,
-                plusargs=RANDOM_STATE + [f"+verilator+seed+{power_up}"] if power_up else [],
+                plusargs=plusargs,
             )
         )
     except (
@@ -165,6 +176,9 @@ def run(top, test, **parameters):
             ),
             pytrace=False,
         )
+    if counts:
+        Path(counts).mkdir(parents=True, exist_ok=True)
+        shutil.copy(own / "coverage.dat", Path(counts) / f"{tag}.{own.name}.dat")
 
 
 def of_netlist(sim, family, source, parameters):

@@ -35,7 +35,7 @@ def on_node(item):
 def pytest_collection_modifyitems(config, items):
     order = {name: n for n, name in enumerate(LONG)}
     items.sort(key=lambda item: order.get(item.path.parent.name, len(LONG)))
-    if os.environ.get("NETLIST") or os.environ.get("POWER_UP"):
+    if any(os.environ.get(name) for name in ("NETLIST", "POWER_UP", "RTL_COVERAGE")):
         blocks = [item for item in items if of_block(item) or on_node(item)]
         config.hook.pytest_deselected(items=[item for item in items if item not in blocks])
         items[:] = blocks

@@ -173,7 +173,7 @@ module i2c_master #(
                 done  <= 1'b1;
                 state <= IDLE;
             end
-            default:
+            default:  // unreachable: state has one of its seven values
                 state <= IDLE;
         endcase
         if (late && (state == RISE || state == WAIT_FREE || state == ENDED)) begin

@@ -121,7 +121,7 @@ module ps2_device #(
                 elapsed <= '0;
                 if (data || !clock) state <= IDLE;
             end
-            default:
+            default:  // unreachable: state has one of its four values
                 state <= IDLE;
         endcase
         if (cut) begin

@@ -136,7 +136,7 @@ module ps2_host #(
             end
             RELEASE:
                 if (clock) state <= IDLE;
-            default:
+            default:  // unreachable: state has one of its six values
                 state <= IDLE;
         endcase
         if (rst) begin

@@ -180,7 +180,7 @@ module relay_requests #(
                     if (at == words + P'(1)) closing <= 1'b1;
                     state <= closing && tail == 2'd3 ? LISTEN : FETCH;
                 end
-            default: state <= LISTEN;
+            default: state <= LISTEN;  // unreachable: state has one of its six values
         endcase
         if (rst) begin
             state       <= LISTEN;

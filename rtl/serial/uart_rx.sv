@@ -87,7 +87,7 @@ module uart_rx #(
                 else if (decide && last)      state <= level ? IDLE : RELEASE;
             RELEASE:  // the line must be high before the next character
                 if (rx) state <= IDLE;
-            default:
+            default:  // unreachable: state has one of its three values
                 state <= IDLE;
         endcase
         if (rst) begin

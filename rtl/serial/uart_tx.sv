@@ -81,7 +81,8 @@ module uart_tx #(
             SEND:    if (ready && !valid) state <= TRAIL;
             TRAIL:   if (valid)           state <= SEND;
                      else if (tick && eighth == 3'd4) state <= IDLE;
-            default:                     state <= IDLE;
+            default:  // unreachable: state has one of its four values
+                state <= IDLE;
         endcase
         if (rst) begin
             state <= IDLE;

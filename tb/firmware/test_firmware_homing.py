@@ -21,12 +21,16 @@ TRAVEL = {
 }
 
 
-def home(axis, method, source=COUNTS, **parameters):
-    """How the homing ended, and the machine."""
+def home(axis, method, source=COUNTS, meanwhile=None, **parameters):
+    """How the homing ended, and the machine; `meanwhile` is called with it when the homing has
+    begun.
+    """
     machine = CompiledNode(axis)
     machine.set(**{**TRAVEL, "home_method": method, "position_source": source, **parameters})
     machine.ask("enable", axis=0, on=1)
     machine.ask("home", axis=0)
+    if meanwhile:
+        meanwhile(machine)
     assert machine.run(60_000, until=lambda: machine.status()["ended"] != "running")
     assert ("homed" in machine.status()["flags"]) == (machine.status()["ended"] == "ok")
     return machine.status()["ended"], machine
@@ -118,6 +122,18 @@ def test_methods_17_and_18_take_the_edge_of_the_switch(method, low, high, sign, 
     ended, machine = home(Axis(position=start * PERIOD, **edges), method)
     edge = sign * -70 * PERIOD + sign * PERIOD // 2  # where the switch of the node opens
     assert ended == "ok" and 0 <= sign * (zero_of(machine) - edge) <= PERIOD
+
+
+def test_a_switch_that_opens_while_the_axis_stops_is_approached_again():
+    axis = Axis(low=-70 * PERIOD)
+
+    def gives_way(machine):
+        assert machine.run(60_000, until=lambda: axis.pressed_low)
+        axis.low_at -= 60 * PERIOD
+
+    ended, machine = home(axis, 17, meanwhile=gives_way)
+    assert ended == "ok" and axis.faults == 0
+    assert 0 <= zero_of(machine) - axis.low_at - PERIOD // 2 <= PERIOD
 
 
 def test_the_delay_of_the_poll_does_not_shift_the_edge_of_the_switch():

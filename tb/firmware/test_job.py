@@ -170,7 +170,42 @@ def test_the_keys_wait_while_a_person_types():
     assert cuts(station) == STATIONS and station.edm.received == station.edm.START * STATIONS
 
 
+def test_the_keys_that_were_sent_wait_while_a_person_types():
+    station = node()
+    start(station, "cutting")
+    assert station.run(5000, until=lambda: station.edm.queue)
+    station.edm.types_until = station.clk + ms(25_000)
+    station.run(15_000)
+    assert station.job()["state"] == "cutting" and cuts(station) == 0
+    station.until("finished")
+    assert cuts(station) == STATIONS and station.edm.received == station.edm.START * STATIONS
+
+
 # the machine
+
+
+def test_a_machine_that_begins_to_cut_by_itself_gets_no_keys():
+    station = node()
+    start(station, "cutting")
+    station.edm.set(1)
+    job = station.until("unsure")
+    assert job["cause"] == "edm_busy" and station.edm.received == b""
+    station.edm.set(0)
+    assert station.do("again") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_a_cut_that_is_interrupted_for_a_moment_is_one_cut():
+    station = node()
+    start(station, "cutting")
+    assert station.run(2000, until=lambda: station.edm.inputs & 1)
+    for level in (0, 1):
+        station.edm.set(level)
+        station.run(100)
+        assert station.job()["state"] == "cutting" and station.sub_node.requests == 1
+    station.until("finished")
+    assert cuts(station) == STATIONS and station.edm.received == station.edm.START * STATIONS
 
 
 def test_after_a_cut_that_does_not_start_a_person_is_asked_and_no_key_is_sent_again():

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C sources of the firmware as a shared library of this computer."""
+"""C sources of the firmware as a shared library of this computer. With FIRMWARE_COVERAGE in the
+environment it lies in this folder, and counts there for gcov which lines and branches are executed.
+"""
 
 import ctypes
 import os
@@ -28,6 +30,9 @@ OPTIONS = [
     f"-I{FIRMWARE}",
 ]
 
+COVERAGE = "FIRMWARE_COVERAGE"
+COUNT = ["--coverage", "-O0", "-fno-sanitize=all"]  # lines and branches are those of the source
+
 
 def compiler() -> list[str]:
     """The command of the system's gcc or clang, else of zig."""
@@ -46,7 +51,11 @@ def host_library_file(name: str, sources: Sequence[Path], options: Sequence[str]
     """Build build/firmware/host_NAME.so, compiled again if a source or any header of the firmware
     is newer; returns it. Raises CalledProcessError if the compiler refuses a source.
     """
-    library = ROOT / "build" / "firmware" / f"host_{name}.so"
+    counts = os.environ.get(COVERAGE)
+    folder = Path(counts) if counts else ROOT / "build" / "firmware"
+    if counts:
+        options = [*options, *COUNT, "-dumpdir", f"{folder}/{name}-"]
+    library = folder / f"host_{name}.so"
     newest = max(path.stat().st_mtime for path in (*sources, *FIRMWARE.rglob("*.h")))
     if not library.exists() or library.stat().st_mtime < newest:
         library.parent.mkdir(parents=True, exist_ok=True)
