@@ -5,10 +5,12 @@ SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside t
                                             build/)
 NETLIST=ecp5|ice40     the netlist that Yosys makes of the module, in place of its RTL
 POWER_UP=number        Verilator, with flip-flops and memories that start in this random state
+MUTANTS=file           the netlist of a block with its mutants, for mutation.blocks
 """
 
 import fcntl
 import hashlib
+import json
 import os
 import random
 import re
@@ -21,6 +23,7 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
+from mutation import block
 from twin import netlist
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -102,7 +105,8 @@ def run(top, test, **parameters):
     if not re.fullmatch(r"[\w.-]{1,100}", tag):
         tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
     family = os.environ.get("NETLIST")
-    kind = "-".join(filter(None, [sim, family, power_up and "power_up"]))
+    request = os.environ.get("MUTANTS")
+    kind = "-".join(filter(None, [sim, family, power_up and "power_up", request and "mutants"]))
     shared = ROOT / "build" / kind / tag
     own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
     own.mkdir(parents=True, exist_ok=True)
@@ -118,6 +122,11 @@ def run(top, test, **parameters):
         direct_verilator(runner)
     if family:
         sources, source, args = of_netlist(sim, family, source, parameters)
+    modules, environment = [".".join(here.relative_to(ROOT).with_suffix("").parts)], {}
+    if request:
+        sources, environment = of_mutants(request, source, parameters, tag)
+        source, args = sources.pop(), quiet(sim)
+        modules.append("tb.mutants")
     if power_up:
         assert sim == "verilator", "Icarus has no random states: POWER_UP needs Verilator"
         args = [*args, "--x-initial", "unique", "--x-assign", "unique"]
@@ -133,7 +142,6 @@ def run(top, test, **parameters):
             timescale=("1ns", "1ps"),
             waves=waves,
         )
-    module = ".".join(here.relative_to(ROOT).with_suffix("").parts)
     number = seed()
     what = f"{top} under {sim}" + (f" as a netlist for {family}" if family else "")
     print(f"{what}, SEED={number}", flush=True)
@@ -144,11 +152,12 @@ def run(top, test, **parameters):
         count, wrong = results(
             runner.test(
                 hdl_toplevel=top,
-                test_module=module,
+                test_module=modules,
                 build_dir=build,
                 test_dir=own,
                 seed=number,
                 waves=waves,
+                extra_env=environment,
                 plusargs=RANDOM_STATE + [f"+verilator+seed+{power_up}"] if power_up else [],
             )
         )
@@ -170,8 +179,30 @@ def run(top, test, **parameters):
 def of_netlist(sim, family, source, parameters):
     """(other sources, source of the top, arguments) of the simulation of a module's netlist."""
     *others, top = netlist.sources(family, source, parameters, search_path())
-    quiet = ["-Wno-timescale"] if sim == "icarus" else ["-Wno-lint", "-Wno-style", "-Wno-fatal"]
-    return others, top, quiet
+    return others, top, quiet(sim)
+
+
+def quiet(sim):
+    """Arguments of a simulator that reads what Yosys has written."""
+    return ["-Wno-timescale"] if sim == "icarus" else ["-Wno-lint", "-Wno-style", "-Wno-fatal"]
+
+
+def of_mutants(request, source, parameters, tag):
+    """(sources, environment) of the simulation of a block with its mutants, by a request of
+    mutation.blocks; a test of another module is skipped.
+    """
+    file = Path(request)
+    asked = json.loads(file.read_text())
+    if source.stem != asked["block"]:
+        pytest.skip(f"there are mutants of {asked['block']} only")
+    folder = block.prepared(source, parameters, search_path(), asked["count"], asked["seed"])
+    chosen = block.mutants_of(folder)[asked["part"] :: asked["parts"]]
+    (file.parent / f"{tag}.folder").write_text(str(folder))
+    return [folder / block.NETLIST], {
+        "MUTANT_VERDICTS": str(file.parent / f"{tag}.verdicts"),
+        "MUTANT_NUMBERS": ",".join(str(mutant.number) for mutant in chosen),
+        "COCOTB_MAX_FAILURES": "1",
+    }
 
 
 def rtl_only(reason):
