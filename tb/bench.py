@@ -124,8 +124,9 @@ def run(top, test, **parameters):
         sources, source, args = of_netlist(sim, family, source, parameters)
     modules, environment = [".".join(here.relative_to(ROOT).with_suffix("").parts)], {}
     if request:
-        sources, environment = of_mutants(request, source, parameters, tag)
-        source, args = sources.pop(), quiet(sim)
+        assert sim == "icarus", "MUTANTS needs Icarus: Verilator's threads do not survive a fork"
+        source, environment = of_mutants(request, source, parameters, own.name)
+        sources, args = [], quiet(sim)
         modules.append("tb.mutants")
     if power_up:
         assert sim == "verilator", "Icarus has no random states: POWER_UP needs Verilator"
@@ -187,9 +188,10 @@ def quiet(sim):
     return ["-Wno-timescale"] if sim == "icarus" else ["-Wno-lint", "-Wno-style", "-Wno-fatal"]
 
 
-def of_mutants(request, source, parameters, tag):
-    """(sources, environment) of the simulation of a block with its mutants, by a request of
-    mutation.blocks; a test of another module is skipped.
+def of_mutants(request, source, parameters, name):
+    """(source, environment) of the simulation of a block with its mutants, by a request of
+    mutation.blocks, which finds the verdicts by the name of the test; a test of another module is
+    skipped. A mutant that another test of the same build has found is not run again.
     """
     file = Path(request)
     asked = json.loads(file.read_text())
@@ -197,11 +199,14 @@ def of_mutants(request, source, parameters, tag):
         pytest.skip(f"there are mutants of {asked['block']} only")
     folder = block.prepared(source, parameters, search_path(), asked["count"], asked["seed"])
     chosen = block.mutants_of(folder)[asked["part"] :: asked["parts"]]
-    (file.parent / f"{tag}.folder").write_text(str(folder))
-    return [folder / block.NETLIST], {
-        "MUTANT_VERDICTS": str(file.parent / f"{tag}.verdicts"),
-        "MUTANT_NUMBERS": ",".join(str(mutant.number) for mutant in chosen),
+    found = block.Run.found(file.parent, folder)
+    numbers = [m.number for m in chosen if m.number not in found]
+    block.Run(str(folder), parameters, numbers).write(file.parent / f"{name}.json")
+    return folder / block.NETLIST, {
+        "MUTANT_VERDICTS": str(file.parent / f"{name}.verdicts"),
+        "MUTANT_NUMBERS": " ".join(map(str, numbers)),
         "COCOTB_MAX_FAILURES": "1",
+        "COCOTB_TEST_FILTER": asked["tests"],
     }
 
 

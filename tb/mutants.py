@@ -8,7 +8,7 @@ until one fails. So a mutant costs the cycles of its tests, and neither the star
 the simulator. The first copy has no mutant: it must pass, and it writes the results of the
 simulation. The parent ends when all are done.
 
-MUTANT_VERDICTS=file MUTANT_NUMBERS=1,2,3 in the environment; a line of the file is `number test`,
+MUTANT_VERDICTS=file MUTANT_NUMBERS='1 2 3' in the environment; a line of the file is `number test`,
 without a test for a survivor.
 """
 
@@ -77,4 +77,4 @@ def serve(path, numbers):
 
 
 if "MUTANT_VERDICTS" in os.environ and cocotb.is_simulation:
-    serve(os.environ["MUTANT_VERDICTS"], map(int, os.environ["MUTANT_NUMBERS"].split(",")))
+    serve(os.environ["MUTANT_VERDICTS"], map(int, os.environ["MUTANT_NUMBERS"].split()))

@@ -25,8 +25,8 @@ MODES = {
     "inv": "inverted",
     "const0": "tied to 0",
     "const1": "tied to 1",
-    "cnot0": "inverted while bit {ctrlbit} is 0",
-    "cnot1": "inverted while bit {ctrlbit} is 1",
+    "cnot0": "inverted while bit {control} is 0",
+    "cnot1": "inverted while bit {control} is 1",
 }
 
 
@@ -39,53 +39,76 @@ class CellMutant:
     """One fault in a cell of a block."""
 
     number: int  # that selects it
-    module: str
     mode: str  # of MODES
     cell: str  # as Yosys calls it, with a number of this build
     port: str  # of the cell
     bit: int  # of the port
-    control: int  # the bit that decides, in some modes
-    place: str  # file:line, the file as it is named in a search by name
+    control: int  # the bit of the port that decides, in some modes
+    wire: str  # at the port, if it has a name in the source
+    file: str  # of the source, "" if Yosys does not know it
+    line: int
 
     @property
     def kind(self) -> str:
-        """What kind of cell it is, such as add or mux."""
-        return self.cell.lstrip("$\\").split("$")[0]
+        """What kind of cell it is, such as add or procmux; the name of an instance."""
+        return self.cell.lstrip("$").split("$")[0]
 
     @property
     def name(self) -> str:
-        """Its name in lists and in the table of reasons."""
-        what = MODES[self.mode].format(ctrlbit=self.control)
-        return f"{self.place}: {self.kind}.{self.port}[{self.bit}] {what}"
+        """Its name in the line of the source."""
+        what = MODES[self.mode].format(control=self.control)
+        wire = f" ({self.wire})" if self.wire else ""
+        return f"{self.kind}.{self.port} bit {self.bit}{wire} {what}"
+
+    @property
+    def place(self) -> str:
+        """Where it is, as an editor wants it."""
+        return f"{self.file}:{self.line}"
+
+    @property
+    def text(self) -> str:
+        """The line of the source."""
+        if not self.file:
+            return ""
+        return (ROOT / self.file).read_text().splitlines()[self.line - 1].strip()
 
 
 def words_of(line: str) -> dict[str, list[str]]:
     """{option: its values} of a line of Yosys's list."""
     found: dict[str, list[str]] = {}
-    for option, values in re.findall(r"-(\w+) ((?:(?!-[a-z]+ )\S+ ?)+)", line):
-        found.setdefault(option, []).append(values.strip())
+    for part in line.split(" -")[1:]:
+        option, _, value = part.partition(" ")
+        found.setdefault(option, []).append(value)
     return found
 
 
 def mutant_of(line: str) -> CellMutant:
-    """The mutant of a line of Yosys's list. Its place is the last and so the smallest source of
-    the cell that Yosys names.
+    """The mutant of a line of Yosys's list. A flip-flop is where its wire is declared, any other
+    cell where it is used.
     """
     words = words_of(line)
-    place = re.sub(r"\.\d+-.*", "", words["src"][-1].split("|")[0]) if "src" in words else "?"
+    sources = words.get("src", [""])
+    place = sources[0 if words["cell"][0].startswith("$procdff") else -1]
+    found = re.match(r"(.*?):(\d+)\.", place)
     return CellMutant(
         int(words["ctrl"][0].split()[-1]),
-        *(words[key][0].lstrip("\\") for key in ("module", "mode", "cell", "port")),
+        words["mode"][0],
+        words["cell"][0].lstrip("\\"),
+        words["port"][0].lstrip("\\"),
         int(words.get("portbit", ["0"])[0]),
         int(words.get("ctrlbit", ["0"])[0]),
-        place.removeprefix(f"{ROOT}/"),
+        words.get("wire", [""])[0].lstrip("\\"),
+        found[1].removeprefix(f"{ROOT}/") if found else "",
+        int(found[2]) if found else 0,
     )
 
 
 def mutants_of(folder: Path) -> list[CellMutant]:
-    """The mutants of a netlist, by number."""
-    lines = (folder / LIST).read_text().splitlines()
-    return [mutant_of(line) for line in lines if line.startswith("mutate")]
+    """The mutants of a netlist, by number. Those of a clock are left out: a block has one clock, and
+    the wiring of clocks is tested elsewhere.
+    """
+    found = [mutant_of(line) for line in (folder / LIST).read_text().splitlines()]
+    return [mutant for mutant in found if not mutant.port.endswith("CLK")]
 
 
 def yosys(passes: Sequence[str], log: Path) -> None:
@@ -136,3 +159,36 @@ def prepared(
     files += [ROOT / v for v in values.values() if isinstance(v, str) and (ROOT / v).is_file()]
     name = build.digest(files, sorted(values.items()), count, seed)
     return build.made_once(BUILD / f"{top}-mutants-{name}", NETLIST, make).parent
+
+
+@dataclass(frozen=True)
+class Run:
+    """One simulation of a build with some of its mutants. The tests leave its verdicts beside it,
+    in a file of lines `number test`, without a test for a survivor.
+    """
+
+    folder: str  # of the netlist
+    parameters: dict[str, int | str]
+    numbers: list[int]  # of the mutants
+
+    def write(self, path: Path) -> None:
+        """Leave it for the campaign."""
+        path.write_text(json.dumps(vars(self)))
+
+    @classmethod
+    def all(cls, folder: Path) -> list[tuple["Run", dict[int, str]]]:
+        """The runs in a folder, each with its verdicts so far: {number: test, "" for a survivor}"""
+        found = []
+        for path in sorted(folder.glob("*.json")):
+            verdicts = path.with_suffix(".verdicts")
+            lines = verdicts.read_text().splitlines() if verdicts.exists() else []
+            pairs = (line.partition(" ") for line in lines)
+            run = cls(**json.loads(path.read_text()))
+            found.append((run, {int(number): test for number, _, test in pairs}))
+        return found
+
+    @classmethod
+    def found(cls, folder: Path, build: Path) -> set[int]:
+        """The mutants of a build that tests have found."""
+        runs = [verdicts for run, verdicts in cls.all(folder) if run.folder == str(build)]
+        return {number for verdicts in runs for number, test in verdicts.items() if test}
