@@ -45,8 +45,7 @@ class CellMutant:
     bit: int  # of the port
     control: int  # the bit of the port that decides, in some modes
     wire: str  # at the port, if it has a name in the source
-    file: str  # of the source, "" if Yosys does not know it
-    line: int
+    source: str  # file:line.column-line.column, "" if Yosys does not know it
 
     @property
     def kind(self) -> str:
@@ -63,14 +62,25 @@ class CellMutant:
     @property
     def place(self) -> str:
         """Where it is, as an editor wants it."""
-        return f"{self.file}:{self.line}"
+        return self.source.partition(".sv:")[0] + ".sv:" + self.line if self.source else "?"
+
+    @property
+    def line(self) -> str:
+        """Number of its line."""
+        return self.source.rpartition(".sv:")[2].partition(".")[0]
 
     @property
     def text(self) -> str:
         """The line of the source."""
-        if not self.file:
+        if not self.source:
             return ""
-        return (ROOT / self.file).read_text().splitlines()[self.line - 1].strip()
+        lines = (ROOT / self.place.partition(":")[0]).read_text().splitlines()
+        return lines[int(self.line) - 1].strip()
+
+    @property
+    def fault(self) -> tuple[str, str, str, str]:
+        """What it has in common with the mutants of other bits, also in other builds."""
+        return self.source, self.kind, self.port, self.mode
 
 
 def words_of(line: str) -> dict[str, list[str]]:
@@ -89,7 +99,7 @@ def mutant_of(line: str) -> CellMutant:
     words = words_of(line)
     sources = words.get("src", [""])
     place = sources[0 if words["cell"][0].startswith("$procdff") else -1]
-    found = re.match(r"(.*?):(\d+)\.", place)
+    found = place.partition("|")[0].removeprefix(f"{ROOT}/")
     return CellMutant(
         int(words["ctrl"][0].split()[-1]),
         words["mode"][0],
@@ -98,8 +108,7 @@ def mutant_of(line: str) -> CellMutant:
         int(words.get("portbit", ["0"])[0]),
         int(words.get("ctrlbit", ["0"])[0]),
         words.get("wire", [""])[0].lstrip("\\"),
-        found[1].removeprefix(f"{ROOT}/") if found else "",
-        int(found[2]) if found else 0,
+        found if ".sv:" in found else "",
     )
 
 

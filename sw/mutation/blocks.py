@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from functools import cache
@@ -145,39 +145,59 @@ def pytest(arguments: Sequence[object], environment: dict[str, str]) -> str:
     return done.stdout
 
 
-def build_words(run: Run) -> str:
+def build_words(parameters: Mapping[str, int | str]) -> str:
     """The parameters of a build in one line."""
-    return " ".join(f"{name}={Path(str(value)).name}" for name, value in run.parameters.items())
+    return " ".join(f"{name}={Path(str(value)).name}" for name, value in parameters.items())
 
 
-def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
-    """The verdicts of the runs of a block. A mutant that one of several tests of the same build
-    finds is found.
+Results = dict[CellMutant, bool]  # whether a test finds it
+
+
+def results_of(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> dict[str, Results]:
+    """{folder of a build: its results}. A mutant that one of several tests of the same build finds
+    is found.
     """
-    verdicts = Verdicts()
-    source = next((ROOT / "rtl").rglob(f"{block}.sv"))
-    folders = sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")})
-    builds: dict[str, list[tuple[Run, dict[int, str]]]] = {}
+    results: dict[str, Results] = {}
     for run, found in runs:
         if missing := set(run.numbers) - set(found):
             raise MutationError(f"{block}: {len(missing)} mutants were not run")
-        builds.setdefault(run.folder, []).append((run, found))
-    met: dict[Reason, bool] = {}  # whether it is needed
-    for folder, same in builds.items():
-        run = same[0][0]
-        words, ports = build_words(run), None
-        for mutant in mutants_of(Path(folder)):
-            said = [found[mutant.number] for _, found in same if mutant.number in found]
-            if not said:
-                continue
+        known = {mutant.number: mutant for mutant in mutants_of(Path(run.folder))}
+        build = results.setdefault(run.folder, {})
+        for number, test in found.items():
+            build[known[number]] = build.get(known[number], False) or bool(test)
+    return results
+
+
+def found_elsewhere(mutant: CellMutant, others: Sequence[Results]) -> bool:
+    """Whether another build has mutants of other bits at this place, and tests find all of them."""
+    for results in others:
+        same = [found for other, found in results.items() if other.fault == mutant.fault]
+        if same and all(same):
+            return True
+    return False
+
+
+def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
+    """The verdicts of the runs of a block."""
+    verdicts, met = Verdicts(), dict[Reason, bool]()  # whether it is needed
+    source = next((ROOT / "rtl").rglob(f"{block}.sv"))
+    folders = sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")})
+    results = results_of(block, runs)
+    parameters = {run.folder: run.parameters for run, _ in runs}
+    for folder, build in results.items():
+        words, ports = build_words(parameters[folder]), None
+        others = [other for path, other in results.items() if path != folder]
+        for mutant, found in build.items():
+            found = found or found_elsewhere(mutant, others)
             reason = next((r for r in reasons() if fits(r, block, words, mutant)), None)
             if reason:
-                met[reason] = met.get(reason, False) or not any(said)
-            if any(said):
+                met[reason] = met.get(reason, False) or not found
+            if found:
                 verdicts.killed += 1
                 continue
-            ports = ports or equivalence.pair(Path(folder), source, run.parameters, folders)
-            verdict, how = equivalence.compared(Path(folder), ports, mutant.number)
+            path = Path(folder)
+            ports = ports or equivalence.pair(path, source, parameters[folder], folders)
+            verdict, how = equivalence.compared(path, ports, mutant.number)
             survivor = Survivor(block, words, mutant, verdict, how)
             if verdict == equivalence.EQUIVALENT:
                 verdicts.equivalent += 1
