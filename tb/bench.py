@@ -198,9 +198,8 @@ def of_mutants(request, source, parameters, name):
     if source.stem != asked["block"]:
         pytest.skip(f"there are mutants of {asked['block']} only")
     folder = block.prepared(source, parameters, search_path(), asked["count"], asked["seed"])
-    chosen = block.mutants_of(folder)[asked["part"] :: asked["parts"]]
     found = block.Run.found(file.parent, folder)
-    numbers = [m.number for m in chosen if m.number not in found]
+    numbers = [m.number for m in block.mutants_of(folder) if m.number not in found]
     block.Run(str(folder), parameters, numbers).write(file.parent / f"{name}.json")
     return folder / block.NETLIST, {
         "MUTANT_VERDICTS": str(file.parent / f"{name}.verdicts"),

@@ -113,8 +113,8 @@ def mutant_of(line: str) -> CellMutant:
 
 
 def mutants_of(folder: Path) -> list[CellMutant]:
-    """The mutants of a netlist, by number. Those of a clock are left out: a block has one clock, and
-    the wiring of clocks is tested elsewhere.
+    """The mutants of a netlist, by number. Those of a clock are left out: a block has one clock,
+    and the wiring of clocks is tested elsewhere.
     """
     found = [mutant_of(line) for line in (folder / LIST).read_text().splitlines()]
     return [mutant for mutant in found if not mutant.port.endswith("CLK")]

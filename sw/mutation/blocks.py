@@ -210,16 +210,9 @@ def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
     return verdicts
 
 
-def measured(
-    block: str,
-    count: int = MUTANTS,
-    seed: int = 1,
-    part: int = 0,
-    parts: int = 1,
-    only: str = "",
-) -> Verdicts:
-    """Run a part of so many mutants of a block against its tests, or against those cocotb tests
-    whose names have `only` in them.
+def measured(block: str, count: int = MUTANTS, seed: int = 1, only: str = "") -> Verdicts:
+    """Run so many mutants of a block against its tests, or against those cocotb tests whose names
+    have `only` in them.
     """
     files = tests()[block]
     items = pytest(["--collect-only", *files], {}).count("::")
@@ -227,7 +220,7 @@ def measured(
     with tempfile.TemporaryDirectory(dir=BUILD, prefix="run-") as folder:
         request = Path(folder) / "request"
         asked = {"block": block, "count": max(1, round(count / items)), "seed": seed}
-        request.write_text(json.dumps({**asked, "part": part, "parts": parts, "tests": only}))
+        request.write_text(json.dumps({**asked, "tests": only}))
         pytest(files, {"MUTANTS": str(request)})
         runs = Run.all(Path(folder))
         if not runs:
