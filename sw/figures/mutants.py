@@ -14,8 +14,8 @@ from mutation.block import MutationError
 from twin.build import ROOT
 
 ENOUGH = 95  # percent of the mutants of a block
-TINY, FEW = "step_permission", 24  # a small block, and some of its mutants
-WEAK = "with_the_drive_off"  # a test of it that does not see most of them
+TINY, FEW = "step_permission", 20  # a small block, and some of its mutants
+WEAK, FEWER = "latency_is_0", 4  # a test of it that does not see all of these
 
 
 @cache
@@ -38,7 +38,7 @@ def verdicts_of_all(tiny: bool, seed: int) -> dict[str, blocks.Verdicts]:
     """Those of all blocks, or of a tiny one."""
     if not tiny:
         return {name: verdicts_of(name, blocks.MUTANTS, seed) for name in names()}
-    planted = verdicts_of(TINY, FEW, seed, WEAK)
+    planted = verdicts_of(TINY, FEWER, seed, WEAK)
     if not any(survivor.mutant.text for survivor in planted.survivors):
         raise SynthesisError(
             f"{TINY} has no survivors with one of its tests alone: {planted.words}"

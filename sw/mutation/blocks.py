@@ -132,7 +132,17 @@ def tests() -> dict[str, list[Path]]:
 def pytest(arguments: Sequence[object], environment: dict[str, str]) -> str:
     """What pytest prints; an error if a test fails."""
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *map(str, arguments)],
+        [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:xdist",
+            *map(str, arguments),
+        ],
         cwd=ROOT,
         env={**os.environ, "SIM": "icarus", **environment},
         stdin=subprocess.DEVNULL,
@@ -143,6 +153,12 @@ def pytest(arguments: Sequence[object], environment: dict[str, str]) -> str:
     if done.returncode:
         raise MutationError(f"pytest {arguments[-1]}: {(done.stdout + done.stderr)[-1500:]}")
     return done.stdout
+
+
+@cache
+def builds_of(block: str) -> int:
+    """How many builds the tests of a block make, at most."""
+    return pytest(["--collect-only", *tests()[block]], {}).count("::")
 
 
 def build_words(parameters: Mapping[str, int | str]) -> str:
@@ -214,14 +230,12 @@ def measured(block: str, count: int = MUTANTS, seed: int = 1, only: str = "") ->
     """Run so many mutants of a block against its tests, or against those cocotb tests whose names
     have `only` in them.
     """
-    files = tests()[block]
-    items = pytest(["--collect-only", *files], {}).count("::")
     BUILD.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=BUILD, prefix="run-") as folder:
         request = Path(folder) / "request"
-        asked = {"block": block, "count": max(1, round(count / items)), "seed": seed}
+        asked = {"block": block, "count": max(1, round(count / builds_of(block))), "seed": seed}
         request.write_text(json.dumps({**asked, "tests": only}))
-        pytest(files, {"MUTANTS": str(request)})
+        pytest(tests()[block], {"MUTANTS": str(request)})
         runs = Run.all(Path(folder))
         if not runs:
             raise MutationError(f"{block}: no test has made a build of it")
