@@ -201,19 +201,24 @@ def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
     results = results_of(block, runs)
     parameters = {run.folder: run.parameters for run, _ in runs}
     for folder, build in results.items():
-        words, ports = build_words(parameters[folder]), None
-        others = [other for path, other in results.items() if path != folder]
+        path, words = Path(folder), build_words(parameters[folder])
+        others = [other for name, other in results.items() if name != folder]
+        unseen: dict[CellMutant, Reason | None] = {}
         for mutant, found in build.items():
-            found = found or found_elsewhere(mutant, others)
             reason = next((r for r in reasons() if fits(r, block, words, mutant)), None)
+            seen = found or found_elsewhere(mutant, others)
             if reason:
-                met[reason] = met.get(reason, False) or not found
-            if found:
+                met[reason] = met.get(reason, False) or not seen
+            if seen:
                 verdicts.killed += 1
-                continue
-            path = Path(folder)
-            ports = ports or equivalence.pair(path, source, parameters[folder], folders)
-            verdict, how = equivalence.compared(path, ports, mutant.number)
+            else:
+                unseen[mutant] = reason
+        if not unseen:
+            continue
+        ports = equivalence.pair(path, source, parameters[folder], folders)
+        compared = equivalence.compared(path, ports, [mutant.number for mutant in unseen])
+        for mutant, reason in unseen.items():
+            verdict, how = compared[mutant.number]
             survivor = Survivor(block, words, mutant, verdict, how)
             if verdict == equivalence.EQUIVALENT:
                 verdicts.equivalent += 1

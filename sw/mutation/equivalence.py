@@ -95,16 +95,26 @@ def abc(aiger: Path, steps: str) -> str:
     return subprocess.run(command, capture_output=True, text=True).stdout
 
 
-def compared(folder: Path, ports: dict[str, Any], number: int) -> tuple[str, str]:
-    """(EQUIVALENT, UNDECIDED or DIFFERENT, words) of a mutant of a build."""
-    text, aiger = folder / f"miter-{number}.v", folder / f"miter-{number}.aig"
-    text.write_text(miter(ports, number))
-    passes = [
-        f"read_rtlil {folder}/{PAIR}; read_verilog -sv -formal {text}",
-        "prep -flatten -top miter; memory_map; opt -full; async2sync; dffunmap",
-        "setundef -undriven -zero; setundef -init -zero; techmap; opt_expr; aigmap",
-        f"opt_clean; write_aiger {aiger}",
-    ]
-    block.yosys(passes, folder / f"miter-{number}.log")
-    said = abc(aiger, f"print_stats; bmc3 -F {DEPTH} -T {SEARCH_S}; pdr -T {PROOF_S}")
-    return judged(abc(aiger, "sat") if NO_STATE.search(said) else said)
+def compared(
+    folder: Path, ports: dict[str, Any], numbers: Sequence[int]
+) -> dict[int, tuple[str, str]]:
+    """{number: (EQUIVALENT, UNDECIDED or DIFFERENT, words)} of mutants of a build."""
+    passes = [f"read_rtlil {folder}/{PAIR}; design -save pair"]
+    for number in numbers:
+        text = folder / f"miter-{number}.v"
+        text.write_text(miter(ports, number))
+        passes += [
+            f"design -load pair; read_verilog -sv -formal {text}",
+            "prep -flatten -top miter; memory_map; opt -full; async2sync; dffunmap",
+            "setundef -undriven -zero; setundef -init -zero; techmap; opt_expr; aigmap",
+            f"opt_clean; write_aiger {text.with_suffix('.aig')}",
+        ]
+    script = folder / "miters.ys"
+    script.write_text("\n".join(passes).replace("; ", "\n"))
+    block.yosys([f"script {script}"], folder / "miters.log")
+    found = {}
+    for number in numbers:
+        aiger = folder / f"miter-{number}.aig"
+        said = abc(aiger, f"print_stats; bmc3 -F {DEPTH} -T {SEARCH_S}; pdr -T {PROOF_S}")
+        found[number] = judged(abc(aiger, "sat") if NO_STATE.search(said) else said)
+    return found
