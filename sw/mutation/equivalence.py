@@ -90,7 +90,7 @@ def judged(said: str) -> tuple[str, str]:
 
 def abc(aiger: Path, steps: str) -> str:
     """What ABC says of a miter."""
-    program = netlist.share().parent / "yosys-abc"
+    program = str(netlist.share().parent / "yosys-abc")
     command = [program, "-c", f"read_aiger {aiger}; fold; strash; scorr; {steps}"]
     return subprocess.run(command, capture_output=True, text=True).stdout
 
