@@ -9,8 +9,10 @@ difference within DEPTH cycles, and then tries to prove for all times that there
 
 import json
 import re
+import resource
 import subprocess
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from mutation import block
 from twin import netlist
 
 DEPTH = 40  # cycles in which a difference is searched
-SEARCH_S, PROOF_S = 5, 10
+SEARCH_S, PROOF_S = 10, 20  # of computing time
 EQUIVALENT, UNDECIDED, DIFFERENT = "equivalent", "undecided", "different"
 NO_STATE = re.compile(r"lat = +0 ")  # what `print_stats` says of a combinational block
 PAIR, CONTRACT = "pair.il", "contract"
@@ -88,11 +90,24 @@ def judged(said: str) -> tuple[str, str]:
     return UNDECIDED, f"no difference in {cycles} cycles, no proof"
 
 
-def abc(aiger: Path, steps: str) -> str:
-    """What ABC says of a miter."""
+def abc(aiger: Path, steps: str, seconds: int) -> str:
+    """What ABC says of a miter, nothing if it takes more computing time. Its own limits count the
+    time of the clock on the wall, which depends on what else runs.
+    """
     program = str(netlist.share().parent / "yosys-abc")
     command = [program, "-c", f"read_aiger {aiger}; fold; strash; scorr; {steps}"]
-    return subprocess.run(command, capture_output=True, text=True).stdout
+    limit = partial(resource.setrlimit, resource.RLIMIT_CPU, (seconds, seconds))
+    return subprocess.run(command, capture_output=True, text=True, preexec_fn=limit).stdout
+
+
+def answer(aiger: Path) -> tuple[str, str]:
+    """(EQUIVALENT, UNDECIDED or DIFFERENT, words) of a miter."""
+    said = abc(aiger, f"print_stats; bmc3 -F {DEPTH}", SEARCH_S)
+    if NO_STATE.search(said):
+        return judged(abc(aiger, "sat", PROOF_S))
+    if judged(said)[0] == UNDECIDED:
+        said += abc(aiger, "pdr", PROOF_S)
+    return judged(said)
 
 
 def compared(
@@ -112,9 +127,4 @@ def compared(
     script = folder / "miters.ys"
     script.write_text("\n".join(passes).replace("; ", "\n"))
     block.yosys([f"script {script}"], folder / "miters.log")
-    found = {}
-    for number in numbers:
-        aiger = folder / f"miter-{number}.aig"
-        said = abc(aiger, f"print_stats; bmc3 -F {DEPTH} -T {SEARCH_S}; pdr -T {PROOF_S}")
-        found[number] = judged(abc(aiger, "sat") if NO_STATE.search(said) else said)
-    return found
+    return {number: answer(folder / f"miter-{number}.aig") for number in numbers}
