@@ -6,10 +6,12 @@ SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside t
 NETLIST=ecp5|ice40     the netlist that Yosys makes of the module, in place of its RTL
 POWER_UP=number        Verilator, with flip-flops and memories that start in this random state
 RTL_COVERAGE=folder    Verilator, which writes a file of coverage counts for each passed test there
+MUTANTS=file           the netlist of a block with its mutants, for mutation.blocks
 """
 
 import fcntl
 import hashlib
+import json
 import os
 import random
 import re
@@ -24,6 +26,7 @@ from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
 from twin import build as twin_build
+from mutation import block
 from twin import netlist
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -108,7 +111,9 @@ def run(top, test, **parameters):
     if not re.fullmatch(r"[\w.-]{1,100}", tag):
         tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
     family = os.environ.get("NETLIST")
-    kind = "-".join(filter(None, [sim, family, power_up and "power_up", counts and "coverage"]))
+    request = os.environ.get("MUTANTS")
+    variants = [power_up and "power_up", counts and "coverage", request and "mutants"]
+    kind = "-".join(filter(None, [sim, family, *variants]))
     shared = ROOT / "build" / kind / tag
     own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
     own.mkdir(parents=True, exist_ok=True)
@@ -124,6 +129,12 @@ def run(top, test, **parameters):
         direct_verilator(runner, waves)
     if family:
         sources, source, args = of_netlist(sim, family, source, parameters)
+    modules, environment = [".".join(here.relative_to(ROOT).with_suffix("").parts)], {}
+    if request:
+        assert sim == "icarus", "MUTANTS needs Icarus: Verilator's threads do not survive a fork"
+        source, environment = of_mutants(request, source, parameters, own.name)
+        sources, args = [], quiet(sim)
+        modules.append("tb.mutants")
     if power_up:
         assert sim == "verilator", "Icarus has no random states: POWER_UP needs Verilator"
         args = [*args, "--x-initial", "unique", "--x-assign", "unique"]
@@ -144,7 +155,6 @@ def run(top, test, **parameters):
             timescale=("1ns", "1ps"),
             waves=waves,
         )
-    module = ".".join(here.relative_to(ROOT).with_suffix("").parts)
     number = seed()
     what = f"{top} under {sim}" + (f" as a netlist for {family}" if family else "")
     print(f"{what}, SEED={number}", flush=True)
@@ -155,12 +165,13 @@ def run(top, test, **parameters):
         count, wrong = results(
             runner.test(
                 hdl_toplevel=top,
-                test_module=module,
+                test_module=modules,
                 build_dir=build,
                 test_dir=own,
                 seed=number,
                 waves=waves,
                 plusargs=plusargs,
+                extra_env=environment,
             )
         )
     except (
@@ -184,8 +195,33 @@ def run(top, test, **parameters):
 def of_netlist(sim, family, source, parameters):
     """(other sources, source of the top, arguments) of the simulation of a module's netlist."""
     *others, top = netlist.sources(family, source, parameters, search_path())
-    quiet = ["-Wno-timescale"] if sim == "icarus" else ["-Wno-lint", "-Wno-style", "-Wno-fatal"]
-    return others, top, quiet
+    return others, top, quiet(sim)
+
+
+def quiet(sim):
+    """Arguments of a simulator that reads what Yosys has written."""
+    return ["-Wno-timescale"] if sim == "icarus" else ["-Wno-lint", "-Wno-style", "-Wno-fatal"]
+
+
+def of_mutants(request, source, parameters, name):
+    """(source, environment) of the simulation of a block with its mutants, by a request of
+    mutation.blocks, which finds the verdicts by the name of the test; a test of another module is
+    skipped. A mutant that another test of the same build has found is not run again.
+    """
+    file = Path(request)
+    asked = json.loads(file.read_text())
+    if source.stem != asked["block"]:
+        pytest.skip(f"there are mutants of {asked['block']} only")
+    folder = block.prepared(source, parameters, search_path(), asked["count"], asked["seed"])
+    found = block.Run.found(file.parent, folder)
+    numbers = [m.number for m in block.mutants_of(folder) if m.number not in found]
+    block.Run(str(folder), parameters, numbers).write(file.parent / f"{name}.json")
+    return folder / block.NETLIST, {
+        "MUTANT_VERDICTS": str(file.parent / f"{name}.verdicts"),
+        "MUTANT_NUMBERS": " ".join(map(str, numbers)),
+        "COCOTB_MAX_FAILURES": "1",
+        "COCOTB_TEST_FILTER": asked["tests"],
+    }
 
 
 def rtl_only(reason):

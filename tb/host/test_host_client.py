@@ -166,9 +166,9 @@ def test_registers_are_read_by_name_and_wide_ones_low_word_first():
     node.ask("enable", axis=0, on=1)
     node.ask("home", axis=0)
     assert axis.node.read_named("axis.control") == {
-        "enable": 1,
+        "enable": 3,
         "closed_loop": 1,
-        "homing": 1,
+        "homing": 3,
         "fine": 0,
     }
     with pytest.raises(

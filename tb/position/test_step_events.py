@@ -62,6 +62,15 @@ async def random_steps_match_the_model(dut):
         await events.clk(random.getrandbits(1), step, int(random.random() < 0.02))
 
 
+@cocotb.test()
+async def each_bit_alone_and_each_two_bits_are_a_step(dut):
+    events = await Events(dut).reset()
+    for high in range(17):
+        for low in range(high + 1):
+            step = 1 << high | 1 << low
+            await events.clk(1, step - (1 << 17 if high == 16 else 0))
+
+
 @pytest.mark.parametrize("delay", [0, 1])
 def test_step_events(delay):
     run("step_events", __file__, DELAY=delay)

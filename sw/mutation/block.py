@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The netlist of a block that contains many mutants of it, of which a register selects one.
+
+Yosys makes the mutants (its pass `mutate`): an input or output bit of a cell is inverted, inverted
+as long as another bit is 0 or 1, or tied to 0 or 1. Cells are those of the RTL, such as an adder or
+a multiplexer, since nothing is mapped. Blocks inside the block are as in the RTL, without mutants.
+The register `mutant` in the netlist has the number of the mutant, or 0 for the block as it is.
+"""
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from twin import build, netlist
+from twin.build import ROOT
+
+BUILD = ROOT / "build" / "mutation"
+SELECTOR = "mutant"
+NETLIST, MUTATED, LIST = "netlist.v", "mutated.il", "mutants.ys"
+MODES = {
+    "inv": "inverted",
+    "const0": "tied to 0",
+    "const1": "tied to 1",
+    "cnot0": "inverted while bit {control} is 0",
+    "cnot1": "inverted while bit {control} is 1",
+}
+
+
+class MutationError(Exception):
+    """One line that says why there are no mutants."""
+
+
+@dataclass(frozen=True)
+class CellMutant:
+    """One fault in a cell of a block."""
+
+    number: int  # that selects it
+    mode: str  # of MODES
+    cell: str  # as Yosys calls it, with a number of this build
+    port: str  # of the cell
+    bit: int  # of the port
+    control: int  # the bit of the port that decides, in some modes
+    wire: str  # at the port, if it has a name in the source
+    source: str  # file:line.column-line.column, "" if Yosys does not know it
+
+    @property
+    def kind(self) -> str:
+        """What kind of cell it is, such as add or procmux; the name of an instance."""
+        return self.cell.lstrip("$").split("$")[0]
+
+    @property
+    def name(self) -> str:
+        """Its name in the line of the source."""
+        what = MODES[self.mode].format(control=self.control)
+        wire = f" ({self.wire})" if self.wire else ""
+        return f"{self.kind}.{self.port} bit {self.bit}{wire} {what}"
+
+    @property
+    def place(self) -> str:
+        """Where it is, as an editor wants it."""
+        return self.source.partition(".sv:")[0] + ".sv:" + self.line if self.source else "?"
+
+    @property
+    def line(self) -> str:
+        """Number of its line."""
+        return self.source.rpartition(".sv:")[2].partition(".")[0]
+
+    @property
+    def text(self) -> str:
+        """The line of the source."""
+        if not self.source:
+            return ""
+        lines = (ROOT / self.place.partition(":")[0]).read_text().splitlines()
+        return lines[int(self.line) - 1].strip()
+
+    @property
+    def fault(self) -> tuple[str, str, str, str]:
+        """What it has in common with the mutants of other bits, also in other builds."""
+        return self.source, self.kind, self.port, self.mode
+
+
+def words_of(line: str) -> dict[str, list[str]]:
+    """{option: its values} of a line of Yosys's list."""
+    found: dict[str, list[str]] = {}
+    for part in line.split(" -")[1:]:
+        option, _, value = part.partition(" ")
+        found.setdefault(option, []).append(value)
+    return found
+
+
+def mutant_of(line: str) -> CellMutant:
+    """The mutant of a line of Yosys's list. A flip-flop is where its wire is declared, any other
+    cell where it is used.
+    """
+    words = words_of(line)
+    sources = words.get("src", [""])
+    place = sources[0 if words["cell"][0].startswith("$procdff") else -1]
+    found = place.partition("|")[0].removeprefix(f"{ROOT}/")
+    return CellMutant(
+        int(words["ctrl"][0].split()[-1]),
+        words["mode"][0],
+        words["cell"][0].lstrip("\\"),
+        words["port"][0].lstrip("\\"),
+        int(words.get("portbit", ["0"])[0]),
+        int(words.get("ctrlbit", ["0"])[0]),
+        words.get("wire", [""])[0].lstrip("\\"),
+        found if ".sv:" in found else "",
+    )
+
+
+def mutants_of(folder: Path) -> list[CellMutant]:
+    """The mutants of a netlist, by number. Those of a clock are left out: a block has one clock,
+    and the wiring of clocks is tested elsewhere.
+    """
+    found = [mutant_of(line) for line in (folder / LIST).read_text().splitlines()]
+    return [mutant for mutant in found if not mutant.port.endswith("CLK")]
+
+
+def yosys(passes: Sequence[str], log: Path) -> None:
+    """Run these passes; what Yosys prints goes to a file."""
+    command = [sys.executable, str(ROOT / "tools" / "yosys.py"), "; ".join(passes)]
+    with open(log, "w") as out:
+        done = subprocess.run(command, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT)
+    if done.returncode:
+        lines = log.read_text().splitlines()
+        errors = [line for line in lines if "ERROR" in line] or lines[-1:]
+        raise MutationError(errors[-1] if errors else f"Yosys ended with {done.returncode}")
+
+
+def with_parameters(text: str, top: str, values: dict[str, str]) -> str:
+    """The netlist with the block's parameters, which Yosys has evaluated, for tests that read them;
+    and with a register as its selector, which nothing in the netlist drives.
+    """
+    lines = "".join(f"  parameter {name} = {value};\n" for name, value in values.items())
+    text = re.sub(rf"^(module {top}\(.*?\);\n)", rf"\1{lines}", text, flags=re.M | re.S)
+    return re.sub(rf"^  wire (\[\d+:0\] {SELECTOR};)", r"  reg \1", text, flags=re.M)
+
+
+def prepared(
+    source: Path, values: netlist.Parameters, folders: Sequence[Path], count: int, seed: int
+) -> Path:
+    """The folder of the netlist of a block with so many mutants, made once."""
+    top, bits = source.stem, count.bit_length()
+    change = "".join(f" -set {name} {netlist.literal(value)}" for name, value in values.items())
+
+    def make(folder: Path) -> None:
+        passes = [
+            f"read_verilog -sv {source}",
+            f"chparam{change} {top}" if change else "",
+            f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
+            f"prep -top {top}; write_json {folder}/interface.json",
+            f"mutate -list {count} -seed {seed} -ctrl {SELECTOR} {bits} 1 -o {folder}/{LIST} {top}",
+            f"script {folder}/{LIST}; write_rtlil {folder}/{MUTATED}",
+            f"delete -input {top}/{SELECTOR}; write_verilog -noattr {folder}/{NETLIST}",
+        ]
+        yosys(passes, folder / "yosys.log")
+        module = json.loads((folder / "interface.json").read_text())["modules"][top]
+        defaults = module.get("parameter_default_values", {})
+        known = {name: netlist.value_of(bits) for name, bits in defaults.items()}
+        file = folder / NETLIST
+        file.write_text(with_parameters(file.read_text(), top, known))
+
+    files = [*netlist.parts(source, folders), Path(__file__), Path(netlist.__file__)]
+    files += [ROOT / v for v in values.values() if isinstance(v, str) and (ROOT / v).is_file()]
+    name = build.digest(files, sorted(values.items()), count, seed)
+    return build.made_once(BUILD / f"{top}-mutants-{name}", NETLIST, make).parent
+
+
+@dataclass(frozen=True)
+class Run:
+    """One simulation of a build with some of its mutants. The tests leave its verdicts beside it,
+    in a file of lines `number test`, without a test for a survivor.
+    """
+
+    folder: str  # of the netlist
+    parameters: dict[str, int | str]
+    numbers: list[int]  # of the mutants
+
+    def write(self, path: Path) -> None:
+        """Leave it for the campaign."""
+        path.write_text(json.dumps(vars(self)))
+
+    @classmethod
+    def all(cls, folder: Path) -> list[tuple["Run", dict[int, str]]]:
+        """The runs in a folder, each with its verdicts so far: {number: test, "" for a survivor}"""
+        found = []
+        for path in sorted(folder.glob("*.json")):
+            verdicts = path.with_suffix(".verdicts")
+            lines = verdicts.read_text().splitlines() if verdicts.exists() else []
+            pairs = (line.partition(" ") for line in lines)
+            run = cls(**json.loads(path.read_text()))
+            found.append((run, {int(number): test for number, _, test in pairs}))
+        return found
+
+    @classmethod
+    def found(cls, folder: Path, build: Path) -> set[int]:
+        """The mutants of a build that tests have found."""
+        runs = [verdicts for run, verdicts in cls.all(folder) if run.folder == str(build)]
+        return {number for verdicts in runs for number, test in verdicts.items() if test}

@@ -1,0 +1,310 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which faults inside a block no test of the block sees.
+
+python -m mutation.blocks [BLOCK …]     mutants of these blocks, or of all; see --help
+
+The tests of a block run on its netlist with mutants (mutation.block), which are divided among the
+builds with different parameters that its tests make. What no test sees and what is not equivalent
+(mutation.equivalence) is a survivor. It needs a better test, or a reason in blocks.toml.
+"""
+
+import argparse
+import fnmatch
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from functools import cache
+from pathlib import Path
+
+from mutation import equivalence
+from mutation.block import BUILD, CellMutant, MutationError, Run, mutants_of
+from twin.build import ROOT
+
+MUTANTS = 1000  # of a block
+REASONS = Path(__file__).with_name("blocks.toml")
+RECORD = ROOT / "docs" / "mutants.toml"
+HEAD = """\
+# SPDX-License-Identifier: Apache-2.0
+# Which mutants of which blocks have been run, and what no test sees. Written by
+# `python -m mutation.blocks --record`; docs/mutation.md says how to read it.
+"""
+LONGEST_S = 24 * 3600
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why no test can find some survivors of a block."""
+
+    block: str
+    line: str  # of the source, without its indentation
+    mutant: str  # pattern of their names
+    why: str
+    build: str = "*"  # pattern of the parameters
+
+
+@dataclass(frozen=True)
+class Survivor:
+    """A mutant that no test of its block sees."""
+
+    block: str
+    build: str  # the parameters, such as W=16 DEPTH=4
+    mutant: CellMutant
+    verdict: str  # of equivalence
+    words: str
+
+    @property
+    def text(self) -> str:
+        """One line for a person."""
+        build = f" {self.build}" if self.build else ""
+        return f"{self.mutant.place}: {self.block}{build}: {self.mutant.name}; {self.words}"
+
+    def explained_by(self, reason: Reason) -> bool:
+        """Whether a reason is about this one."""
+        return fits(reason, self.block, self.build, self.mutant)
+
+
+def fits(reason: Reason, block: str, build: str, mutant: CellMutant) -> bool:
+    """Whether a reason is about a mutant of a build."""
+    return (
+        reason.block == block
+        and reason.line == mutant.text
+        and fnmatch.fnmatchcase(mutant.name, reason.mutant)
+        and fnmatch.fnmatchcase(build, reason.build)
+    )
+
+
+@cache
+def reasons() -> tuple[Reason, ...]:
+    """The table of reasons."""
+    entries = tomllib.loads(REASONS.read_text()).get("reason", [])
+    return tuple(Reason(**entry) for entry in entries)
+
+
+@dataclass
+class Verdicts:
+    """What became of the mutants of a block."""
+
+    killed: int = 0
+    equivalent: int = 0
+    undecided: int = 0  # of the survivors, those without a difference in the cycles of the search
+    survivors: list[Survivor] = field(default_factory=list)  # without a reason
+    explained: list[tuple[Survivor, Reason]] = field(default_factory=list)
+    stale: list[str] = field(default_factory=list)  # reasons whose mutants are all found
+
+    @property
+    def different(self) -> int:
+        """Mutants that are not equivalent."""
+        return self.killed + len(self.survivors) + len(self.explained)
+
+    @property
+    def percent(self) -> float:
+        """Share of the mutants that are not equivalent which tests find."""
+        return 100 * self.killed / self.different if self.different else 100.0
+
+    @property
+    def words(self) -> str:
+        return (
+            f"{self.killed} of {self.different} found, {self.equivalent} equivalent, "
+            f"{len(self.survivors)} survivors ({self.undecided} undecided), "
+            f"{len(self.explained)} explained, {len(self.stale)} stale reasons"
+        )
+
+
+@cache
+def tests() -> dict[str, list[Path]]:
+    """{block: files of the tests that simulate it by itself} of all blocks below rtl/."""
+    known = {path.stem for path in (ROOT / "rtl").rglob("*.sv")}
+    found: dict[str, list[Path]] = {}
+    for file in sorted((ROOT / "tb").rglob("test_*.py")):
+        named = re.findall(r"\brun\(\s*\"(\w+)\",\s*__file__", file.read_text())
+        for name in sorted(set(named) & known):
+            found.setdefault(name, []).append(file)
+    return found
+
+
+def pytest(arguments: Sequence[object], environment: dict[str, str]) -> str:
+    """What pytest prints; an error if a test fails."""
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:xdist",
+            *map(str, arguments),
+        ],
+        cwd=ROOT,
+        env={**os.environ, "SIM": "icarus", **environment},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST_S,
+    )
+    if done.returncode:
+        raise MutationError(f"pytest {arguments[-1]}: {(done.stdout + done.stderr)[-1500:]}")
+    return done.stdout
+
+
+@cache
+def builds_of(block: str) -> int:
+    """How many builds the tests of a block make, at most."""
+    return pytest(["--collect-only", *tests()[block]], {}).count("::")
+
+
+def build_words(parameters: Mapping[str, int | str]) -> str:
+    """The parameters of a build in one line."""
+    return " ".join(f"{name}={Path(str(value)).name}" for name, value in parameters.items())
+
+
+Results = dict[CellMutant, bool]  # whether a test finds it
+
+
+def results_of(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> dict[str, Results]:
+    """{folder of a build: its results}. A mutant that one of several tests of the same build finds
+    is found.
+    """
+    results: dict[str, Results] = {}
+    for run, found in runs:
+        if missing := set(run.numbers) - set(found):
+            raise MutationError(f"{block}: {len(missing)} mutants were not run")
+        known = {mutant.number: mutant for mutant in mutants_of(Path(run.folder))}
+        build = results.setdefault(run.folder, {})
+        for number, test in found.items():
+            build[known[number]] = build.get(known[number], False) or bool(test)
+    return results
+
+
+def found_elsewhere(mutant: CellMutant, others: Sequence[Results]) -> bool:
+    """Whether another build has mutants of other bits at this place, and tests find all of them."""
+    for results in others:
+        same = [found for other, found in results.items() if other.fault == mutant.fault]
+        if same and all(same):
+            return True
+    return False
+
+
+def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
+    """The verdicts of the runs of a block."""
+    verdicts, met = Verdicts(), dict[Reason, bool]()  # whether it is needed
+    source = next((ROOT / "rtl").rglob(f"{block}.sv"))
+    folders = sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")})
+    results = results_of(block, runs)
+    parameters = {run.folder: run.parameters for run, _ in runs}
+    for folder, build in results.items():
+        path, words = Path(folder), build_words(parameters[folder])
+        others = [other for name, other in results.items() if name != folder]
+        unseen: dict[CellMutant, Reason | None] = {}
+        for mutant, found in build.items():
+            reason = next((r for r in reasons() if fits(r, block, words, mutant)), None)
+            seen = found or found_elsewhere(mutant, others)
+            if reason:
+                met[reason] = met.get(reason, False) or not seen
+            if seen:
+                verdicts.killed += 1
+            else:
+                unseen[mutant] = reason
+        if not unseen:
+            continue
+        ports = equivalence.pair(path, source, parameters[folder], folders)
+        compared = equivalence.compared(path, ports, [mutant.number for mutant in unseen])
+        for mutant, reason in unseen.items():
+            verdict, how = compared[mutant.number]
+            survivor = Survivor(block, words, mutant, verdict, how)
+            if verdict == equivalence.EQUIVALENT:
+                verdicts.equivalent += 1
+            elif reason:
+                verdicts.explained.append((survivor, reason))
+            else:
+                verdicts.survivors.append(survivor)
+                verdicts.undecided += verdict == equivalence.UNDECIDED
+    verdicts.stale = [f"{r.block}: {r.line}: {r.mutant}" for r, needed in met.items() if not needed]
+    return verdicts
+
+
+def measured(block: str, count: int = MUTANTS, seed: int = 1, only: str = "") -> Verdicts:
+    """Run so many mutants of a block against its tests, or against those cocotb tests whose names
+    have `only` in them.
+    """
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=BUILD, prefix="run-") as folder:
+        request = Path(folder) / "request"
+        asked = {"block": block, "count": max(1, round(count / builds_of(block))), "seed": seed}
+        request.write_text(json.dumps({**asked, "tests": only}))
+        pytest(tests()[block], {"MUTANTS": str(request)})
+        runs = Run.all(Path(folder))
+        if not runs:
+            raise MutationError(f"{block}: no test has made a build of it")
+        return judge(block, runs)
+
+
+def record(block: str, verdicts: Verdicts, count: int, seed: int) -> None:
+    """Add the verdicts of a block to the record, in place of older ones."""
+    known = tomllib.loads(RECORD.read_text()) if RECORD.exists() else {}
+    known[block] = {
+        "date": date.today(),
+        "mutants": verdicts.different + verdicts.equivalent,
+        "seed": seed,
+        "asked": count,
+        "found": verdicts.killed,
+        "equivalent": verdicts.equivalent,
+        "survivors": [survivor.text for survivor in verdicts.survivors],
+        "explained": [f"{s.text}: {reason.why}" for s, reason in verdicts.explained],
+    }
+    lines = [HEAD]
+    for name, entry in sorted(known.items()):
+        lines.append(f"[{name}]")
+        for key, value in entry.items():
+            if isinstance(value, list):
+                inside = "".join(f"    {json.dumps(text, ensure_ascii=False)},\n" for text in value)
+                lines.append(f"{key} = [\n{inside}]" if value else f"{key} = []")
+            else:
+                lines.append(f"{key} = {value}")
+        lines.append("")
+    RECORD.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m mutation.blocks")
+    parser.add_argument("blocks", nargs="*", help="modules below rtl/ with a test; default: all")
+    parser.add_argument("--list", action="store_true", help="print the blocks, run nothing")
+    parser.add_argument("--count", type=int, default=MUTANTS, help="mutants of each block")
+    parser.add_argument("--seed", type=int, default=1, help="which mutants, 1 and up")
+    parser.add_argument("--record", action="store_true", help="add the results to docs")
+    options = parser.parse_args(arguments)
+    if unknown := set(options.blocks) - set(tests()):
+        parser.error(f"{sorted(unknown)[0]} is no block that a test simulates by itself")
+    names = options.blocks or sorted(tests())
+    if options.list:
+        print(*names, sep="\n")
+        return 0
+    wrong = 0
+    for name in names:
+        try:
+            verdicts = measured(name, options.count, options.seed)
+        except MutationError as error:
+            print(f"{name}: {error}", file=sys.stderr, flush=True)
+            wrong += 1
+            continue
+        print(f"{name}: {verdicts.words}", flush=True)
+        for survivor in verdicts.survivors:
+            print(f"  {survivor.text}", flush=True)
+        for line in verdicts.stale:
+            print(f"  stale reason: {line}", flush=True)
+        wrong += len(verdicts.survivors) + len(verdicts.stale)
+        if options.record:
+            record(name, verdicts, options.count, options.seed)
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The mutation test of blocks: names and places of mutants, verdicts of the comparison with the
+block, and reasons that are kept for existing lines only.
+"""
+
+import json
+
+import pytest
+
+from mutation import block, blocks, equivalence
+from mutation.block import Run, mutant_of, mutants_of
+from tb.bench import ROOT, of_mutants, search_path, source_of
+
+LINE = (
+    r"mutate -ctrl mutant 4 9 -mode cnot1 -module permission -cell $procdff$24 -port Q -portbit 3 "
+    r"-ctrlbit 2 -wire elapsed -wirebit 3 -src rtl/common/tick_divider.sv:24.19-24.26 "
+    r"-src rtl/common/tick_divider.sv:29.5-36.8"
+)
+
+
+def test_a_mutant_has_the_place_and_the_name_of_its_fault():
+    mutant = mutant_of(LINE)
+    assert (mutant.number, mutant.place) == (9, "rtl/common/tick_divider.sv:24")
+    assert mutant.name == "procdff.Q bit 3 (elapsed) inverted while bit 2 is 1"
+    assert mutant.text.startswith("logic [W-1:0] elapsed;")
+    adder = mutant_of(LINE.replace("$procdff$24", "$add$rtl/x.sv:31$7"))
+    assert adder.place == "rtl/common/tick_divider.sv:29" and adder.kind == "add"
+
+
+@pytest.fixture(scope="module")
+def divider():
+    """The folder of the mutants of a small block."""
+    return block.prepared(source_of("tick_divider"), {"W": 8}, search_path(), 20, 1)
+
+
+def test_the_netlist_has_the_parameters_of_the_block_and_a_register_that_selects(divider):
+    text = (divider / block.NETLIST).read_text()
+    assert "  parameter W = 8;\n" in text and "  reg [4:0] mutant;\n" in text
+    assert {mutant.number for mutant in mutants_of(divider)} <= set(range(1, 21))
+
+
+def test_a_mutant_of_no_consequence_is_equivalent_and_another_one_is_not(divider):
+    """Bit 7 of the constant 1 that a reset writes is 0 already. The first mutant inverts a bit of
+    the count.
+    """
+    ports = equivalence.pair(divider, source_of("tick_divider"), {"W": 8}, search_path())
+    mutants = {mutant.number: mutant for mutant in mutants_of(divider)}
+    idle = next(n for n, m in mutants.items() if m.name == "procmux.B bit 7 tied to 0")
+    active = next(n for n, m in mutants.items() if m.name == "procdff.Q bit 0 (elapsed) inverted")
+    verdicts = equivalence.compared(divider, ports, [idle, active])
+    assert verdicts[idle][0] == equivalence.EQUIVALENT
+    assert verdicts[active][0] == equivalence.DIFFERENT
+
+
+def test_what_abc_says_is_understood():
+    assert equivalence.judged("Property proved.")[0] == equivalence.EQUIVALENT
+    assert equivalence.judged("UNSATISFIABLE")[0] == equivalence.EQUIVALENT
+    assert equivalence.judged("SATISFIABLE")[0] == equivalence.DIFFERENT
+    said = "Output 0 of miter was asserted in frame 5."
+    assert equivalence.judged(said) == (equivalence.DIFFERENT, "seen at the outputs after 5 cycles")
+    verdict, words = equivalence.judged("No output asserted in 40 frames.")
+    assert verdict == equivalence.UNDECIDED and "40 cycles" in words
+    assert equivalence.judged("")[0] == equivalence.UNDECIDED, "no answer is not equivalence"
+
+
+def runs_of(path, divider, tests):
+    """What the tests of one simulation leave, read back."""
+    Run(str(divider), {"W": 8}, list(tests)).write(path / "a.json")
+    (path / "a.verdicts").write_text("".join(f"{n} {t}\n" for n, t in tests.items()))
+    return Run.all(path)
+
+
+def test_a_planted_survivor_is_reported_with_its_place_and_its_reason_explains_it(
+    tmp_path, divider, monkeypatch
+):
+    number = next(m.number for m in mutants_of(divider) if m.kind == "procdff")
+    mutant = next(m for m in mutants_of(divider) if m.number == number)
+    runs = runs_of(tmp_path, divider, {number: "", number + 1: "a_test"})
+    verdicts = blocks.judge("tick_divider", runs)
+    assert [s.mutant for s in verdicts.survivors] == [mutant] and verdicts.killed == 1
+    assert verdicts.survivors[0].text.startswith(f"{mutant.place}: tick_divider W=8: {mutant.name}")
+    assert verdicts.percent == 50
+    reason = blocks.Reason("tick_divider", mutant.text, "procdff.*", "because")
+    monkeypatch.setattr(blocks, "reasons", lambda: (reason,))
+    verdicts = blocks.judge("tick_divider", runs)
+    assert not verdicts.survivors and len(verdicts.explained) == 1 and not verdicts.stale
+    runs = runs_of(tmp_path, divider, {number: "a_test"})
+    assert blocks.judge("tick_divider", runs).stale, "its mutant is found"
+
+
+def test_a_mutant_that_was_not_run_is_an_error(tmp_path, divider):
+    Run(str(divider), {"W": 8}, [1]).write(tmp_path / "a.json")
+    with pytest.raises(block.MutationError, match="1 mutants were not run"):
+        blocks.judge("tick_divider", Run.all(tmp_path))
+
+
+def test_a_mutant_is_found_if_another_build_finds_those_of_other_bits_at_its_place():
+    mutant = mutant_of(LINE)
+    other = mutant_of(LINE.replace("-portbit 3", "-portbit 1"))
+    elsewhere = mutant_of(LINE.replace("24.19", "25.19"))
+    assert blocks.found_elsewhere(mutant, [{other: True, elsewhere: False}])
+    assert not blocks.found_elsewhere(mutant, [{other: False}, {elsewhere: True}])
+
+
+def test_every_reason_is_about_a_line_that_exists():
+    for reason in blocks.reasons():
+        lines = [line.strip() for line in source_of(reason.block).read_text().splitlines()]
+        assert reason.line in lines, reason
+        assert len(reason.why) > 20
+
+
+def test_a_block_with_a_test_of_its_own_is_found():
+    files = blocks.tests()
+    assert files["tick_divider"] == [ROOT / "tb" / "common" / "test_tick_divider.py"]
+    assert "recorded_encoder" not in files, "it is a bench"
+
+
+def test_the_request_of_another_block_is_refused(tmp_path):
+    (tmp_path / "request").write_text(json.dumps({"block": "tick_divider"}))
+    with pytest.raises(pytest.skip.Exception, match="mutants of tick_divider only"):
+        of_mutants(tmp_path / "request", source_of("time_stamp"), {"W": 4}, "x")
