@@ -13,7 +13,7 @@ from typing import Any
 
 from rich.progress import Progress
 
-from campaigns import runner, version
+from campaigns import runner
 from campaigns.campaign import Result
 from campaigns.runner import Failure, Job
 from campaigns.soak import progress_bar
@@ -135,8 +135,8 @@ def conclude(study: Study, job: Job, store: Store, again: str) -> Answer:
     simulated = sum(float(result.counts.get(SIMULATED, 0)) for result in job.results.values())
     taken = sum(result.seconds for result in job.results.values())
     facts = {
-        "runs": f"{len(job.results)} of {job.parts}: {study.singles} with one effect alone or none, "
-        f"{study.repeats} times; {study.runs} with all effects drawn",
+        "runs": f"{len(job.results)} of {job.parts}: {study.singles} with one effect alone or "
+        f"none; {study.runs} with all effects drawn",
         "parameters that all runs have": ", ".join(f"{n} {v:g}" for n, v in study.fixed.items())
         or "those of sw/twin/parameters",
         "simulated time, time of cores": f"{units.format_time(round(simulated, 1))}, "

@@ -44,10 +44,10 @@ class Measured:
 class Machine:
     """A machine of a study.
 
-    `table` names its parameters in sw/twin/parameters, `absent` those of its parts that it does not
-    have. `run(values, measure, seed, targets)` is one run: parameters, what is measured, the seed of
-    the machine, that of the targets. `prepare` builds what all runs need. `expected_s` estimates the
-    processor time of a run.
+    `table` names its parameters in sw/twin/parameters, `absent` how those of its absent parts
+    begin. `run(values, measure, seed, targets)` is one run: parameters, what is measured, the
+    seed of the machine, that of the targets. `prepare` builds what all runs need. `expected_s`
+    estimates the processor time of a run.
     """
 
     name: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a study is shown: the page with its pictures, the table for the terminal, and the raw data."""
+"""How a study is shown: the page with its pictures, the table for the terminal, the raw data."""
 
 import io
 from collections.abc import Mapping, Sequence
@@ -202,9 +202,9 @@ def page(found: Findings, facts: Mapping[str, object]) -> str:
         "increase": "the error with this effect alone at its bad value less that of the baseline "
         "with the same random numbers; one that is smaller than the scatter of the repeats says "
         "nothing",
-        "rank correlation": "Spearman's, of the magnitude of the effect with the error of the drawn "
-        f"machines; ? where it may be chance, with {CONFIDENCE:.0%} confidence for all effects "
-        "together",
+        "rank correlation": "Spearman's, of the magnitude of the effect with the error of the "
+        f"drawn machines; ? where it may be chance, with {CONFIDENCE:.0%} confidence for all "
+        "effects together",
         "yield": "share of the drawn machines that keep the specification; its bound is that of "
         "Clopper and Pearson, one side",
     }

@@ -80,6 +80,8 @@ def text_of(value: float, unit: str) -> str:
     if base == SHARE:
         return f"{value:g}"
     prefixes = {prefix: worths(unit).get(prefix + base) for prefix in ("", *PREFIXES)}
-    fitting = [(worth, prefix) for prefix, worth in prefixes.items() if worth and worth <= abs(value)]
+    fitting = [
+        (worth, prefix) for prefix, worth in prefixes.items() if worth and worth <= abs(value)
+    ]
     worth, prefix = max(fitting) if fitting else (1.0, "")
     return f"{value / worth:g} {prefix}{base}"

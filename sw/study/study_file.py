@@ -414,7 +414,8 @@ def example(machine: Machine = MACHINES["s0"]) -> str:
 
 
 EXAMPLE = """\
-# A study of the machine {name}: {what}.
+# A study of the machine {name}:
+# {what}.
 # Run it with `moire study FILE`; docs/study.md explains it.
 machine = "{name}"
 
@@ -427,27 +428,27 @@ moves = 10                    # the same targets in each run
 travel = "10 mm"              # the targets are from 0 to here
 shortest_move = "100 nm"
 longest_move = "2 mm"         # the lengths are spread evenly over their logarithm
-calibrated = false            # true: sine and cosine are calibrated first (moire calibrate)
-scale_corrected = false       # true: the scale is measured each 0.5 mm first, a segment table holds its errors
+calibrated = false            # true: sine and cosine are calibrated first
+scale_corrected = false       # true: a segment table corrects the scale, measured each 0.5 mm
 
 [one_at_a_time]               # each effect alone at its bad value
-others = "typical"            # the others then: "typical" or "nominal" (as the twin is without a study)
+others = "typical"            # the others then: "typical", or "nominal" as in sw/twin/parameters
 repeats = {repeats}                   # with other random numbers
 
 [monte_carlo]                 # all effects drawn, each run another machine
 runs = {runs}                    # --runs N overrides it; more runs later repeat nothing
 
 [fixed]                       # parameters of sw/twin/parameters that all runs have
-drift_time = "10 s"           # what drifts has drifted at the end of a run, which takes about this long
+drift_time = "10 s"           # what drifts has drifted then; a run takes about this long
 temperature_time = "10 s"
 
 # Each effect has a distribution over the machines:
-#   name = "typical to bad"                                   evenly between these two values
-#   name = {{ uniform = ["low", "high"] }}                      evenly between two values
-#   name = {{ normal = ["mean", "deviation"] }}                 and within = ["low", "high"] cuts it off
-# alone = "value" is what it has when it is tried alone; without it this is the end on the side of the
-# bad value, of a normal distribution the mean and two deviations. An effect that is left out stays as
-# the twin has it.
+#   name = "typical to bad"                     evenly between these two values
+#   name = {{ uniform = ["low", "high"] }}        evenly between two values
+#   name = {{ normal = ["mean", "deviation"] }}   and within = ["low", "high"] cuts it off
+# With alone = "value" it has this one when it is tried alone. Otherwise that is the end on the side
+# of the bad value; of a normal distribution it is two deviations from the mean. An effect that is
+# left out stays as in sw/twin/parameters.
 [effects]
 {effects}
 """
