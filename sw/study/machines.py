@@ -78,7 +78,8 @@ def run_s0(values: Mapping[str, float], measure: Measure, seed: int, targets: in
     """Powers up an axis of S0's stage with these parameters, homes it and makes the moves. The
     error is the true position minus the target, the zero being that of the homing.
     """
-    stage = Stage.power_up(seed, [AXIS], node_parameters=WITH_SEGMENTS, **values)
+    plant: dict[str, Any] = dict(values)
+    stage = Stage.power_up(seed, [AXIS], node_parameters=WITH_SEGMENTS, **plant)
     with stage.twin:
         stage.home(AXIS)
         if measure.calibrated:

@@ -170,7 +170,9 @@ def baseline_words(found: Findings) -> str:
 
 def page(found: Findings, facts: Mapping[str, object]) -> str:
     """The whole page, as HTML."""
-    study, parts, numbers = found.study, [], []
+    study = found.study
+    parts: list[str] = []
+    numbers: list[tuple[str, str]] = []
     if found.drawn:
         numbers = [
             (f"{found.share:.1%}", f"yield: {found.good} of {len(found.drawn)} machines"),
@@ -193,8 +195,8 @@ def page(found: Findings, facts: Mapping[str, object]) -> str:
     head = ("effect", "unit", "distribution", "alone", "increase", "rank correlation")
     parts += ["<h2>What matters</h2>", report.table(head, ranking_rows(found), text_columns=3)]
     if found.faulted:
-        head = ("run", "seed", "why the machine faulted")
-        parts += ["<h2>Faults</h2>", report.table(head, fault_rows(found), text_columns=3)]
+        columns = ("run", "seed", "why the machine faulted")
+        parts += ["<h2>Faults</h2>", report.table(columns, fault_rows(found), text_columns=3)]
     others = {
         "specification": study.spec.words,
         "each run": measure_words(study),

@@ -328,8 +328,7 @@ def effect_of(reader: Reader, machine: Machine, name: str, value: Any, others: s
     worlds = {world: tables.world(world, machine.table)[name] for world in tables.WORLDS}
     typical, bad = worlds[TYPICAL], worlds["bad"]
     if value == TYPICAL_TO_BAD:
-        ends = sorted((typical, bad))
-        distribution, alone = Distribution(*ends), bad
+        distribution, alone = Distribution(min(typical, bad), max(typical, bad)), bad
     elif isinstance(value, dict):
         distribution = distribution_of(reader, machine, name, value)
         alone = distribution.end(upper=bad >= typical)
