@@ -15,7 +15,7 @@ from math import inf
 import numpy as np
 
 from campaigns.campaign import Campaign, Counts, Result
-from moire.errors import MoireError
+from moire.errors import MotionFailed, NotCalibrated, Refused
 from study.machines import MACHINES
 from study.study_file import Study
 
@@ -51,7 +51,9 @@ def run_of(study: Study, part: int, part_seed: int) -> Run:
 
 
 def carry_out(study: Study, part: int, part_seed: int) -> Counts:
-    """Runs a part. A machine that cannot home or move has faulted, which is a result, too."""
+    """Runs a part. A machine that cannot home or move has faulted, which is a result, too; any
+    other error, such as that of firmware which does not fit this host, leaves the part undone.
+    """
     run = run_of(study, part, part_seed)
     counts: dict[str, float | str] = {RUNS: 1, FAULTED: 0}
     counts |= {f"{VALUE} {name}": value for name, value in run.values.items()}
@@ -60,7 +62,7 @@ def carry_out(study: Study, part: int, part_seed: int) -> Counts:
         measured = MACHINES[study.machine].run(
             {**study.fixed, **run.values}, study.measure, run.seed, targets
         )
-    except MoireError as error:
+    except (Refused, MotionFailed, NotCalibrated) as error:
         return {**counts, FAULTED: 1, ENDED: str(error)}
     counts[SIMULATED] = measured.simulated_s
     counts |= {f"{ERROR} {n}": error for n, error in enumerate(measured.errors_nm)}

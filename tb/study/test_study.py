@@ -17,7 +17,7 @@ from pyarrow import parquet
 
 from campaigns import runner
 from moire.cli import command_line
-from moire.errors import BadFile, MoireError, UnitError
+from moire.errors import BadFile, MotionFailed, NoAnswer, UnitError
 from study import command, quantities
 from study.analysis import findings, rank_correlation
 from study.machines import MACHINES, Machine, Measured
@@ -244,7 +244,7 @@ def formula(monkeypatch):
         noise = np.random.default_rng(seed).normal()
         error = 7e6 * values["scale_linear"] + 1e3 * values["motor_cogging"] + noise
         if values.get("scale_walk", 0.0) > 15e-9:
-            raise MoireError("the axis cannot home")
+            raise MotionFailed("ended_by_fault", 1, "the axis cannot home")
         return Measured([error / 4, -error, error / 2][: measure.moves], 1.5)
 
     machine = Machine(
@@ -349,14 +349,16 @@ def test_a_machine_that_cannot_home_is_a_bad_one(formula, study):
 
 
 def test_a_run_that_breaks_is_reported_and_the_others_are_evaluated(formula, study, monkeypatch):
+    """An error that is not of the machine counts as no result, neither good nor bad."""
+
     def breaks(values, measure, seed, targets):
         if seed == 9:
-            raise ZeroDivisionError("no result")
+            raise NoAnswer(1)
         return Measured([1.0], 1.0)
 
     monkeypatch.setitem(MACHINES, "formula", replace(MACHINES["formula"], run=breaks))
     code, out, err = study(TWO, "--runs", "5")
-    assert code == 1 and "1 runs are not done; run 8: ZeroDivisionError: no result" in err
+    assert code == 1 and "1 runs are not done; run 8: NoAnswer: nobody answers" in err
 
 
 def test_the_yield_has_the_bound_of_clopper_and_pearson(formula):
