@@ -19,7 +19,6 @@ from campaigns.runner import Failure, Job
 from campaigns.soak import progress_bar
 from campaigns.store import Store
 from moire import units
-from moire.cli.session import Interrupted
 from moire.errors import MoireError, TwinNotBuilt
 from study import page, study_file
 from study.analysis import findings
@@ -34,6 +33,12 @@ RESULTS = ROOT / "build" / "study"
 
 class NotComplete(MoireError):
     """Runs of the study are missing."""
+
+
+class Stopped(MoireError):
+    """Ctrl-C ended the study early."""
+
+    exit_code = 130
 
 
 @dataclass(frozen=True)
@@ -179,7 +184,7 @@ def carry_out(
         + [f"--results {results}"] * bool(results)
     )
     if not run(study, job, store, workers, scheduler):
-        raise Interrupted("interrupted; what is done is kept: the same command goes on from here")
+        raise Stopped("interrupted; what is done is kept: the same command goes on from here")
     if not job.results:
         raise NotComplete(f"no run is done; the first: {next(iter(job.failures.values())).reason}")
     answer = conclude(study, job, store, again)
