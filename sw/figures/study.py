@@ -3,6 +3,7 @@
 
 import tempfile
 import time
+from dataclasses import replace
 
 from campaigns import runner
 from campaigns.store import Store
@@ -12,13 +13,16 @@ from study import command
 from study.machines import MACHINES
 
 WORKERS = (1, 2)
-RUNS = 48
+RUNS, MOVES = 48, 10
 TEXT = """\
 machine = "s0"
 [spec]
 largest_error = "0.3 um"
 [one_at_a_time]
 repeats = 0
+[fixed]
+travel_start_lowest = "-0.95 mm"
+travel_start_highest = "-0.9 mm"
 [effects]
 scale_linear = "typical to bad"
 guide_tilt = "typical to bad"
@@ -27,9 +31,10 @@ floor_velocity = "typical to bad"
 """
 
 
-def seconds_on(workers: int, runs: int, seed: int, processes: bool) -> float:
+def seconds_on(workers: int, runs: int, moves: int, seed: int, processes: bool) -> float:
     """Time of the study from the start of its workers to its last result, all runs done."""
     study = command.read(TEXT, "study", runs)
+    study = replace(study, measure=replace(study.measure, moves=moves))
     with tempfile.TemporaryDirectory() as folder:
         store = Store(folder)
         job = command.prepared(study, store, seed)
@@ -42,9 +47,11 @@ def seconds_on(workers: int, runs: int, seed: int, processes: bool) -> float:
     return took
 
 
-def study_scaling(runs: int = RUNS, seed: int = 1, processes: bool = True) -> float:
+def study_scaling(
+    runs: int = RUNS, moves: int = MOVES, seed: int = 1, processes: bool = True
+) -> float:
     MACHINES["s0"].prepare()
-    one, two = (seconds_on(workers, runs, seed, processes) for workers in WORKERS)
+    one, two = (seconds_on(workers, runs, moves, seed, processes) for workers in WORKERS)
     console.print(f"{runs} runs: {one:.1f} s on one worker, {two:.1f} s on two")
     return one / two
 
@@ -54,11 +61,11 @@ FIGURES = {
         study_scaling,
         "",
         f"time of moire study on one worker over two, on two cores with nothing else to do: {RUNS} "
-        "drawn machines of S0, 10 moves each, the start of the workers included",
+        f"drawn machines of S0, {MOVES} moves each, the start of the workers included",
         ">= 1.8",
         Quick(
-            {"runs": 1, "processes": False},
-            "one run by one worker and one by two, threads instead of processes",
+            {"runs": 1, "moves": 1, "processes": False},
+            "one run of one move by one worker and one by two, threads instead of processes",
             "",
         ),
         2,
