@@ -2,8 +2,8 @@
 """Cycles among modules, and imports that go round the package system.
 
 - Python: the modules of moire, twin, campaigns, code_coverage, experiments, figures, fuzz,
-  firmware, mutation, tables, tools and tb import each other without a cycle, deferred imports
-  included;
+  firmware, mutation, study, tables, tools and tb import each other without a cycle, deferred
+  imports included;
 - nothing outside tb imports from tb, and moire imports none of the others;
 - nothing patches sys.path or loads a file by an import spec;
 - C and C++: a module is x.c with x.h; modules include each other without a cycle;
@@ -33,6 +33,7 @@ PACKAGES = {
     "firmware": "sw/firmware",
     "fuzz": "sw/fuzz",
     "mutation": "sw/mutation",
+    "study": "sw/study",
     "tables": "tables",
     "tools": "tools",
     "tb": "tb",

@@ -6,7 +6,7 @@ A command is a line of an indented or `sh` code block that begins with `moire`, 
 
 - commands for hardware (`--port /dev/ttyUSB0`, or no port at all) go to a served twin; a page says
   `<!-- machine: s4 -->` where this is not the stage of S0;
-- a code block with the info string `csv NAME` is written to the file NAME first;
+- a code block with the info string `csv NAME` or `toml NAME` is written to the file NAME first;
 - a `python` code block that begins with an import is run as a program;
 - `moire twin` serves until the next one, an experiment or the end of the page, and what would run
   for ever is ended by Ctrl-C;
@@ -77,7 +77,7 @@ def read(path: Path) -> Page:
     for block in re.findall(r"^```python\n((?:from|import) .*?)^```", text, re.M | re.S):
         page.programs.append(block)
     for info, line in code_lines(text):
-        if info.startswith("csv "):
+        if info.startswith(("csv ", "toml ")):
             name = info.split()[1]
             page.files[name] = page.files.get(name, "") + line + "\n"
         elif info in ("", "sh") and COMMAND.match(line):
@@ -137,7 +137,7 @@ class Session:
             name, _, value = command.removeprefix("export ").partition("=")
             self.environment[name] = HARDWARE.sub(self.port, value) if self.port else value
             return None
-        if words.startswith("moire ") and not re.search(r"--port twin|--help", words):
+        if words.startswith("moire ") and not re.search(r"--port twin|--help|^moire study", words):
             self.need_port()
         if words.startswith("pip install"):
             words = words.replace("install", "install --dry-run --no-deps --no-build-isolation")

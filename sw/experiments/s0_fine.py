@@ -42,8 +42,6 @@ FINE: Mapping[str, str | float] = {
     "fine_reach": "100nm",
     "settle_window": "3nm",
 }
-STROKES = ("0.7mm", "0.3mm")  # targets of the strokes during the calibration
-MOST_STROKES = 30
 ZERO_S = 0.2  # the position of the zero is averaged over this time
 HOLD_S = 1.0  # the jitter is measured over this time
 TRACE_HZ = 10_000
@@ -63,18 +61,6 @@ class FineStage(Stage):
     def power_up(cls, seed: int = 1, names: Sequence[str] = ("X",), **plant: Any) -> Self:
         """The machine with these axes after power-up; `plant` overrides parameters of its model."""
         return super().power_up(seed, names, node_parameters=NODE, **{"piezo_fitted": 1, **plant})
-
-    def calibrate_ellipse(self, name: str) -> CalibrationState:
-        """Moves an axis back and forth until the calibration accepts a measurement, and freezes the
-        correction; returns the state of the calibration.
-        """
-        axis = self.axes[name]
-        axis.calibration("calibrate")
-        for stroke in range(MOST_STROKES):
-            axis.move(STROKES[stroke % len(STROKES)], progress=self.record_while_moving(name))
-            if axis.calibration().accepted:
-                break
-        return axis.calibration("freeze")
 
     def prepare(self, name: str, calibrated: bool = True) -> CalibrationState:
         """Homes and calibrates an axis, homes it again and switches its fine stage on; returns the

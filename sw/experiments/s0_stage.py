@@ -25,7 +25,7 @@ from rich.table import Table
 from moire.analysis import report
 from moire.client.axis import Axis
 from moire.client.bus import Bus
-from moire.client.records import Identity, Status
+from moire.client.records import CalibrationState, Identity, Status
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport
 from twin.build import ROOT
@@ -35,6 +35,8 @@ ADDRESSES = {"X": 1, "Y": 2}  # on the bus; the axes of the twin have the same o
 PERIOD_NM = 800.0
 POLL_S = 0.005  # between two polls of a motion
 MOVES = 24
+STROKES = ("0.7mm", "0.3mm")  # targets of the strokes during the calibration
+MOST_STROKES = 30
 LEFT_OUT = (
     "errors of the scale along its travel, temperature, vibration of the floor, drift of the "
     "signals, noise of the amplifiers and of the DAC"
@@ -124,6 +126,18 @@ class Stage:
         )
         return status
 
+    def calibrate_ellipse(self, name: str) -> CalibrationState:
+        """Moves an axis back and forth until the calibration accepts a measurement, and freezes the
+        correction; returns the state of the calibration.
+        """
+        axis = self.axes[name]
+        axis.calibration("calibrate")
+        for stroke in range(MOST_STROKES):
+            axis.move(STROKES[stroke % len(STROKES)], progress=self.record_while_moving(name))
+            if axis.calibration().accepted:
+                break
+        return axis.calibration("freeze")
+
     def true_nm(self, name: str, from_zero: bool = True) -> float:
         """The true position of the table of this axis, which no controller can see."""
         return self.twin.true_position_nm(list(ADDRESSES).index(name)) - (
@@ -168,15 +182,16 @@ def random_moves(
     progress: Callable[[Statuses], object] | None = None,
     done: Callable[[report.Move], object] | None = None,
     high_nm: float = 20e6,
+    lengths_nm: tuple[float, float] = (100.0, 2e6),
 ) -> list[report.Move]:
-    """Makes `count` moves of the axes in turn, from 0 to `high_nm`; the seed determines the
-    targets.
+    """Makes `count` moves of the axes in turn, from 0 to `high_nm`, the shortest and the longest
+    of `lengths_nm`; the seed determines the targets.
     """
     source, here = random.Random(seed), {name: 0.0 for name in stage.axes}
     moves: list[report.Move] = []
     for number in range(count):
         name = list(stage.axes)[number % len(stage.axes)]
-        here[name] = random_target(here[name], source, high_nm=high_nm)
+        here[name] = random_target(here[name], source, *lengths_nm, high_nm=high_nm)
         moves.append(stage.move(name, here[name], progress))
         if done is not None:
             done(moves[-1])

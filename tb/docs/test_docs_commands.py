@@ -25,11 +25,12 @@ def test_commands_files_and_the_machine_are_read_from_a_page(tmp_path):
     page = page_of(
         tmp_path,
         "<!-- machine: s4 -->\n# Title\n\n    moire find     # who is there\n    not a command\n\n"
-        "```csv angles.csv\n0deg\n90deg\n```\n\n```sh\nmake help\n```\n"
+        "```csv angles.csv\n0deg\n90deg\n```\n```toml a.toml\nb = 1\n```\n```toml\nc = 2\n```\n"
+        "\n```sh\nmake help\n```\n"
         "```python\nfrom moire import Bus\n```\n```python\nbus.sync()\n```\n",
     )
     assert page.commands == ["moire find", "make help"] and page.machine == "s4"
-    assert page.files == {"angles.csv": "0deg\n90deg\n"}
+    assert page.files == {"angles.csv": "0deg\n90deg\n", "a.toml": "b = 1\n"}
     assert page.programs == ["from moire import Bus\n"]
 
 

@@ -25,7 +25,15 @@ def test_every_parameter_has_a_unit_and_a_reason():
     for machine in parameters.MACHINES:
         for name, entry in parameters.load(machine).items():
             assert {"value", "unit", "why"} <= set(entry), (machine, name)
-            assert set(entry) <= {"value", "unit", "why", "typical", "bad"}, (machine, name)
+            known = {"value", "unit", "why", "typical", "bad", "lowest"}
+            assert set(entry) <= known, (machine, name)
+            assert (
+                all(
+                    entry["lowest"] <= entry[key]
+                    for key in known & {"value", "typical", "bad"} & set(entry)
+                )
+                or "lowest" not in entry
+            ), (machine, name)
             assert "bad" in entry or "typical" not in entry, (machine, name)
             assert entry["unit"] and len(entry["why"]) >= 2, (machine, name)
     with pytest.raises(KeyError, match="no parameter screw_pitch"):

@@ -42,12 +42,20 @@ def open_twin(baud: int, machine: str = DEFAULT, seed: int = 1, **settings: Any)
 
     A checkout of Moire offers it as the entry point `twin` of the group `moire.ports`.
     """
-    found = tuple(entry_points(group="moire.ports", name=PORT))
-    if not found:
-        raise TwinNotBuilt(
-            "the simulated machine needs a checkout of Moire: run `make demo` there and use its "
-            "build/venv/bin/moire"
-        )
-    transport: Transport = found[0].load()(machine, seed, **settings)
+    open_port = of_checkout("moire.ports", PORT, "the simulated machine")
+    transport: Transport = open_port(machine, seed, **settings)
     transport.set_baud(baud)
     return transport
+
+
+def of_checkout(group: str, name: str, what: str) -> Any:
+    """What a checkout of Moire offers as an entry point; raises TwinNotBuilt where none is
+    installed.
+    """
+    found = tuple(entry_points(group=group, name=name))
+    if not found:
+        raise TwinNotBuilt(
+            f"{what} needs a checkout of Moire: run `make demo` there and use its "
+            "build/venv/bin/moire"
+        )
+    return found[0].load()
