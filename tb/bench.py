@@ -5,6 +5,7 @@ SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside t
                                             build/)
 NETLIST=ecp5|ice40     the netlist that Yosys makes of the module, in place of its RTL
 POWER_UP=number        Verilator, with flip-flops and memories that start in this random state
+CROSSINGS=number       each change of an asynchronous input may arrive one cycle later, by chance
 """
 
 import fcntl
@@ -21,10 +22,9 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
-from twin import netlist
+from twin import crossings, netlist
 
 ROOT = Path(__file__).resolve().parent.parent
-RANDOM_STATE = ["+verilator+rand+reset+2"]  # what Verilator's X of the power-up becomes: random
 BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself
 WAIVERS = [
     ROOT / "rtl" / "cpu" / "cores.vlt"
@@ -38,17 +38,18 @@ def package(name):
 
 
 def search_path():
-    """Every folder in which a module is found by its name: the rooms of rtl/, and the packages of
-    the soft cores.
+    """Every folder in which a module is found by its name: the model of the crossings, the rooms of
+    rtl/, and the packages of the soft cores.
     """
     rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
     cores = package("pythondata_cpu_picorv32"), package("pythondata_cpu_serv")
     places = "verilog", "verilog/rtl"
-    return rooms + [core / place for core, place in zip(cores, places, strict=True) if core]
+    return crossings.folders() + rooms + [core / place for core, place in zip(cores, places, strict=True) if core]
 
 
 def source_of(top):
-    found = list((ROOT / "rtl").rglob(f"{top}.sv"))
+    modelled = [path for d in crossings.folders() for path in d.glob(f"{top}.sv")]
+    found = modelled or list((ROOT / "rtl").rglob(f"{top}.sv"))
     assert len(found) == 1, (
         f"there must be exactly one {top}.sv under rtl/, "
         f"found {[str(p.relative_to(ROOT)) for p in found]}"
@@ -102,7 +103,8 @@ def run(top, test, **parameters):
     if not re.fullmatch(r"[\w.-]{1,100}", tag):
         tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
     family = os.environ.get("NETLIST")
-    kind = "-".join(filter(None, [sim, family, power_up and "power_up"]))
+    late = crossings.seed() and "crossings"
+    kind = "-".join(filter(None, [sim, family, power_up and "power_up", late]))
     shared = ROOT / "build" / kind / tag
     own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
     own.mkdir(parents=True, exist_ok=True)
@@ -139,6 +141,7 @@ def run(top, test, **parameters):
     print(f"{what}, SEED={number}", flush=True)
     again = f"SIM={sim} SEED={number}" + (f" NETLIST={family}" if family else "")
     again += f" POWER_UP={power_up}" if power_up else ""
+    again += f" CROSSINGS={crossings.seed()}" if late else ""
     failed = f"{what}: {{}}. Again: make test K={name.split('[')[0]} {again}"
     try:
         count, wrong = results(
@@ -149,7 +152,7 @@ def run(top, test, **parameters):
                 test_dir=own,
                 seed=number,
                 waves=waves,
-                plusargs=RANDOM_STATE + [f"+verilator+seed+{power_up}"] if power_up else [],
+                plusargs=crossings.plusargs() + random_state(power_up),
             )
         )
     except (
@@ -167,6 +170,11 @@ def run(top, test, **parameters):
         )
 
 
+def random_state(power_up):
+    """The arguments with which Verilator makes the state after power-up random."""
+    return ["+verilator+rand+reset+2", f"+verilator+seed+{power_up}"] if power_up else []
+
+
 def of_netlist(sim, family, source, parameters):
     """(other sources, source of the top, arguments) of the simulation of a module's netlist."""
     *others, top = netlist.sources(family, source, parameters, search_path())
@@ -177,6 +185,14 @@ def of_netlist(sim, family, source, parameters):
 def rtl_only(reason):
     """In a cocotb test: skip it on a netlist, for a reason such as what it reads inside."""
     if os.environ.get("NETLIST"):
+        pytest.skip(reason)
+
+
+def steady_only(reason):
+    """In a cocotb test: skip it if a change at a pin may arrive one cycle later, for a reason such
+    as a latency to the cycle.
+    """
+    if crossings.seed():
         pytest.skip(reason)
 
 

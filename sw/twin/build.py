@@ -5,7 +5,8 @@ it and the machines.
 Everything lies under build/twin/<hash of all that goes in>, so nothing is built twice. The firmware
 is no part of it: it is written into the nodes' memory when a twin is made. With TWIN_SHORT_RUNS=1
 in the environment, as in tests, a library is built in a fifth of the time, unless the usual one is
-there already.
+there already. With CROSSINGS=seed in the environment, each change of an asynchronous input may
+arrive one cycle later; with POWER_UP=seed, flip-flops and memories of a node start in random states.
 
     python -m twin.build          builds both libraries and the firmware, and prints their paths
 """
@@ -24,7 +25,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from firmware import build as firmware_build
-from twin import netlist, rising_edge, statements
+from twin import crossings, netlist, rising_edge, statements
 from twin.parameters import tables as parameters
 
 HERE = Path(__file__).resolve().parent
@@ -54,15 +55,24 @@ COMPILE = [
 VERILATE = [
     "--cc",
     "-O3",
-    "--x-assign",
-    "fast",
-    "--x-initial",
-    "fast",
     "--no-timing",
     "--timescale",
     "1ns/1ps",
     "-Wall",
 ]
+STATES = {  # of flip-flops after power-up: all 0, or random
+    False: ["--x-assign", "fast", "--x-initial", "fast"],
+    True: ["--x-assign", "unique", "--x-initial", "unique"],
+}
+# `rising_edge` by Verilator's own evaluation, twice a cycle: with the inputs, and at the edge
+BOTH_LEVELS = """struct Rest {};  // nothing rests
+inline void rising_edge(Vnode___024root& pins, Rest&) {
+    for (int level = 0; level < 2; level++) {
+        pins.clk = level;
+        pins.vlSymsp->__Vm_modelp->eval();
+    }
+}
+"""
 BY_PRODUCTS = ("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat", "*.gcda")
 VERILATED = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
 # The twin is compiled twice, for a fifth less time a cycle: the first library counts in a short run
@@ -122,6 +132,13 @@ def for_short_runs() -> bool:
 def compile_flags() -> list[str]:
     """How Verilated C++ is compiled once."""
     return COMPILE_SOON if for_short_runs() else COMPILE
+
+
+def verilate_flags() -> list[str]:
+    """How Verilator makes C++: after power-up, all is 0 or, with POWER_UP in the environment, in the
+    random state that this seed gives.
+    """
+    return [*VERILATE, *STATES[bool(os.environ.get("POWER_UP"))]]
 
 
 def learns(tool: str) -> bool:
@@ -236,9 +253,15 @@ def common_objects() -> Path:
 
 
 def rtl_path() -> list[Path]:
-    """Every folder in which a module is found by its name."""
+    """Every folder in which a module is found by its name: the model of the crossings first."""
     directories = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
-    return directories + [package(name, "a soft core") / place for name, place in CORES.items()]
+    cores = [package(name, "a soft core") / place for name, place in CORES.items()]
+    return crossings.folders() + directories + cores
+
+
+def rtl_sources() -> list[Path]:
+    """All files of the RTL, and those that are found before them."""
+    return sorted(p for d in (ROOT / "rtl", *crossings.folders()) for p in d.rglob("*.sv"))
 
 
 def runtime(tool: str, verilator: Path) -> Path:
@@ -282,7 +305,7 @@ def verilate(
     run(
         [
             verilator / "bin" / "verilator_bin",
-            *VERILATE,
+            *verilate_flags(),
             "--prefix",
             prefix,
             "--top-module",
@@ -308,7 +331,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
     flags = compile_flags()
     support, files = (
         runtime(tool, verilator),
-        [driver, source, *sorted((ROOT / "rtl").rglob("*.sv")), *DRIVER_HEADERS],
+        [driver, source, *rtl_sources(), *DRIVER_HEADERS],
     )
     own, include = [], [f"-I{FIRMWARE}", f"-I{HERE.parent}"]
     if firmware:
@@ -365,7 +388,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
         files,
         tool,
         flags,
-        VERILATE,
+        verilate_flags(),
         parameters,
         (verilator / "bin" / "verilator_bin").stat().st_size,
     )
@@ -375,7 +398,9 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
 def verilate_node(
     folder: Path, verilator: Path, clk_hz: int, axes: int, node: Mapping[str, int]
 ) -> None:
-    """C++ of a node, and the header that names its memory."""
+    """C++ of a node, and the header that names its memory. Random crossings read a pin more than
+    once, which sw/twin/rising_edge.py does not handle: Verilator evaluates such a node itself.
+    """
     values = {
         "CLK_HZ": clk_hz,
         "AXES": axes,
@@ -404,7 +429,11 @@ def verilate_node(
             "has node_memory been renamed?"
         )
     try:
-        evaluation = rising_edge.function(rising_edge.Design.read(folder))
+        evaluation = (
+            BOTH_LEVELS
+            if crossings.seed()
+            else rising_edge.function(rising_edge.Design.read(folder))
+        )
     except statements.FormError as error:
         raise BuildError(
             f"Verilator's code is not as sw/twin/rising_edge.py expects: {error}"
@@ -440,12 +469,10 @@ def netlist_of_node(
 def verilate_netlist(
     folder: Path, verilator: Path, sources: Sequence[Path], clk_hz: int, axes: int
 ) -> None:
-    """C++ of the netlist of a node. Verilator evaluates it twice a cycle: with the inputs, and at
-    the rising edge.
-    """
+    """C++ of the netlist of a node."""
     run(
         [
-            *[verilator / "bin" / "verilator_bin", *VERILATE, "-Wno-lint", "-Wno-style"],
+            *[verilator / "bin" / "verilator_bin", *verilate_flags(), "-Wno-lint", "-Wno-style"],
             *["-Wno-fatal", "--prefix", "Vnode", "--top-module", "node", *sources],
             *["--Mdir", folder],
         ],
@@ -457,13 +484,7 @@ def verilate_netlist(
         "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
-        "constexpr bool SERIAL_CORE = false;\n"
-        "struct Rest {};  // nothing of a netlist rests\n"
-        "inline void rising_edge(Vnode___024root& pins, Rest&) {\n"
-        "    for (int level = 0; level < 2; level++) {\n"
-        "        pins.clk = level;\n"
-        "        pins.vlSymsp->__Vm_modelp->eval();\n"
-        "    }\n}\n"
+        f"constexpr bool SERIAL_CORE = false;\n{BOTH_LEVELS}"
     )
 
 
@@ -483,7 +504,7 @@ def twin_library(
     verilator = package("verilator", "it makes C++ of the RTL")
     sources = [
         *own_sources(),
-        *sorted((ROOT / "rtl").rglob("*.sv")),
+        *rtl_sources(),
         *sorted((ROOT / "rtl").rglob("*.vlt")),
         *cells,
         package("pythondata_cpu_picorv32", "the soft core") / "verilog" / "picorv32.v",
@@ -492,7 +513,7 @@ def twin_library(
 
     def folder_of(*flags: Sequence[str]) -> Path:
         design = (clk_hz, axes, sorted((node or {}).items()), tool, verilator_bytes)
-        return BUILD / f"twin-{digest(sources, *design, *flags)}"
+        return BUILD / f"twin-{digest(sources, *design, verilate_flags(), *flags)}"
 
     folder, soon = folder_of(COMPILE, COUNT_BRANCHES, USE_COUNTS), bool(cells) or for_short_runs()
     if (folder / "libtwin.so").exists():
