@@ -44,7 +44,11 @@ def search_path():
     rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
     cores = package("pythondata_cpu_picorv32"), package("pythondata_cpu_serv")
     places = "verilog", "verilog/rtl"
-    return crossings.folders() + rooms + [core / place for core, place in zip(cores, places, strict=True) if core]
+    return (
+        crossings.folders()
+        + rooms
+        + [core / place for core, place in zip(cores, places, strict=True) if core]
+    )
 
 
 def source_of(top):

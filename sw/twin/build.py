@@ -6,7 +6,8 @@ Everything lies under build/twin/<hash of all that goes in>, so nothing is built
 is no part of it: it is written into the nodes' memory when a twin is made. With TWIN_SHORT_RUNS=1
 in the environment, as in tests, a library is built in a fifth of the time, unless the usual one is
 there already. With CROSSINGS=seed in the environment, each change of an asynchronous input may
-arrive one cycle later; with POWER_UP=seed, flip-flops and memories of a node start in random states.
+arrive one cycle later; with POWER_UP=seed, flip-flops and memories of a node start in a random
+state.
 
     python -m twin.build          builds both libraries and the firmware, and prints their paths
 """
@@ -135,8 +136,8 @@ def compile_flags() -> list[str]:
 
 
 def verilate_flags() -> list[str]:
-    """How Verilator makes C++: after power-up, all is 0 or, with POWER_UP in the environment, in the
-    random state that this seed gives.
+    """How Verilator makes C++: after power-up all is 0 or, with POWER_UP in the environment, in a
+    random state.
     """
     return [*VERILATE, *STATES[bool(os.environ.get("POWER_UP"))]]
 

@@ -22,7 +22,9 @@ def folders() -> list[Path]:
     if not seed():
         return []
     if os.environ.get("NETLIST"):
-        raise ValueError("CROSSINGS and NETLIST exclude each other: a netlist has its synchronisers")
+        raise ValueError(
+            "CROSSINGS and NETLIST exclude each other: a netlist has its synchronisers"
+        )
     return [HERE]
 
 
