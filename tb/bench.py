@@ -4,7 +4,8 @@
 SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside the results, under
                                             build/)
 NETLIST=ecp5|ice40     the netlist that Yosys makes of the module, in place of its RTL
-POWER_UP=number        Verilator, with flip-flops and memories that start in this random state
+POWER_UP=number        Verilator, with flip-flops and memories that start in this random state, some
+                       cycles before the reset, and a reset of random length
 CROSSINGS=number       each change of an asynchronous input may arrive one cycle later, by chance
 """
 
@@ -222,12 +223,20 @@ def needs(condition, reason):
 
 async def start(dut, period_ns=10, **inputs):
     """Clock running, inputs at the given levels, two cycles of reset; returns just after reset
-    falls.
+    falls. With POWER_UP in the environment, the reset takes two to nine cycles and comes up to 15
+    cycles after the clock.
     """
+    before, length = 0, 2
+    if power_up := os.environ.get("POWER_UP"):
+        chance = random.Random(f"{power_up} {dut._name}")
+        before, length = chance.randrange(16), chance.randrange(2, 10)
     for name, level in inputs.items():
         getattr(dut, name).value = level
-    dut.rst.value = 1
+    dut.rst.value = int(before == 0)
     Clock(dut.clk, period_ns, "ns", impl="gpi").start(start_high=False)
-    for _ in range(2):
+    for _ in range(before):
+        await RisingEdge(dut.clk)
+    dut.rst.value = 1
+    for _ in range(length):
         await RisingEdge(dut.clk)
     dut.rst.value = 0
