@@ -45,7 +45,8 @@ def wrong(name, logic, comment="pin"):
     source.write_text(
         f"module {name} (\n"
         f"    input wire clk,\n    input wire rst,\n    input wire level,  // {comment}\n"
-        "    output logic q\n);\nwire held;\nlogic own;\nalways_ff @(posedge clk) own <= q;\n"
+        "    output logic q,\n    output logic own\n);\nwire held;\n"
+        "always_ff @(posedge clk) own <= q;\n"
         f"{logic}\nendmodule\n"
     )
     netlist = crossings.elaborated(source, {}, crossings.FLAT)
