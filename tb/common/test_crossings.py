@@ -75,10 +75,13 @@ def test_a_crossing_elsewhere_is_found(name, logic, comment, words):
 
 
 def test_each_input_of_each_design_has_one_rate():
-    for source in crossings.designs().values():
-        for port, comment in crossings.inputs_of(source).items():
-            if crossings.kind_of(comment) == "asynchronous":
-                assert crossings.rate_of(port, 1.0) > 0
+    ports = [
+        port
+        for source in crossings.designs().values()
+        for port, comment in crossings.inputs_of(source).items()
+        if crossings.kind_of(comment) == "asynchronous"
+    ]
+    assert len(ports) >= 20 and min(crossings.rate_of(port, 1.0) for port in ports) > 0
 
 
 @pytest.mark.parametrize("seed", [1, 2])

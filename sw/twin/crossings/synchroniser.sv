@@ -5,7 +5,8 @@
 // Each change of each bit is kept back for one cycle or not, by chance. A change that does not last
 // until the next edge is lost if it is kept back. The random numbers come from the name of the
 // instance and from the seed, and are the same ones after each reset, so a run can be repeated; one
-// is used in each cycle in which a bit changes. tb/common/synchroniser.py is the model, equal in every bit of every cycle.
+// is used in each cycle in which a bit changes. tb/common/synchroniser.py is the model, equal in
+// every bit of every cycle.
 `default_nettype none
 
 module synchroniser #(
@@ -43,7 +44,7 @@ module synchroniser #(
         if ($value$plusargs("crossings=%d", seed) == 0) seed = 1;
         first = 32'h811C_9DC5 ^ seed;
         for (int n = 0; n < name.len(); n++)
-            first = (first ^ {24'd0, name[n]}) * 32'h0100_0193;  // FNV-1a
+        first = (first ^ {24'd0, name[n]}) * 32'h0100_0193;  // FNV-1a
         if (first == 0) first = 1;
         drawn = first;
     end
