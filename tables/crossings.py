@@ -34,6 +34,7 @@ TOPS = ("constraints/*/top.sv", "sw/figures/counter_box_bench.sv")  # around one
 CLOCKS = {"clk", "clk_25mhz"}
 RESET = "rst"
 FLAT = "proc; flatten; opt_clean; write_json {netlist}"
+BOXES = "+/ecp5/cells_bb.v rtl/node.sv"  # of the tops
 AROUND = "proc; opt_clean; write_json {netlist}"
 BITWISE = {"$mux": "AB", "$and": "AB", "$or": "AB", "$xor": "AB", "$not": "A"}
 FLIP_FLOP = re.compile(r"\$_?(s?dff|aldff|adff|dlatch|sr)")
@@ -225,9 +226,11 @@ def crossings_of(design: str, netlist: Netlist, comments: Mapping[str, str]) -> 
     return sorted(found, key=lambda one: order.index(one.inputs[0]) if one.inputs else len(order))
 
 
-def elaborated(source: Path, parameters: Mapping[str, int | str], passes: str) -> Netlist:
-    """A module with everything below it, or with what `passes` leave of it."""
-    file = yosys(source, parameters, passes, "crossings", "+/ecp5/cells_bb.v")
+def elaborated(
+    source: Path, parameters: Mapping[str, int | str], passes: str, boxes: str = ""
+) -> Netlist:
+    """A module with everything below it but the modules of the files `boxes`."""
+    file = yosys(source, parameters, passes, "crossings", boxes)
     return Netlist(json.loads(file.read_text())["modules"][source.stem])
 
 
@@ -235,7 +238,7 @@ def wrong_pins(top: Path, node: Mapping[str, str]) -> Iterator[str]:
     """The asynchronous inputs of a top that do not go to asynchronous ports of its node, and those
     that flip-flops of the top take.
     """
-    netlist = elaborated(top, {}, AROUND)
+    netlist = elaborated(top, {}, AROUND, BOXES)
     for port, comment in inputs_of(top).items():
         for start in netlist.bits(port):
             for name, at, _ in netlist.sinks(start):
