@@ -24,9 +24,9 @@ help:             ## this list
 demo: $(SETUP) $(FIRMWARE)   ## the S0 stage: home it, move it, show where it went
 	@$(PYTHON) -m experiments.s0_stage
 
-test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1, NETLIST=ecp5|ice40
+test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1, NETLIST=ecp5|ice40, CROSSINGS=seed
 	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(NETLIST), on netlists for $(NETLIST))$(if $(SEED), with SEED=$(SEED)))
-	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' NETLIST='$(NETLIST)' POWER_UP='$(POWER_UP)' $(PYTHON) -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder $(if $K,-k '$K') tb
+	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' NETLIST='$(NETLIST)' POWER_UP='$(POWER_UP)' CROSSINGS='$(CROSSINGS)' $(PYTHON) -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder $(if $K,-k '$K') tb
 
 check: fresh lint proofs test quick  ## what every change must pass
 	@echo 'check: all passed'

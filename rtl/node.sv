@@ -57,7 +57,7 @@ module node #(
     input  wire               clk,
     input  wire               rst,
     // RS-485 bus
-    input  wire  [       3:0] address,              // address of the node on the bus
+    input  wire  [       3:0] address,              // address of the node, static
     input  wire               rs485_rx,             // pin, idles high
     output logic              rs485_tx,             // pin, idles high
     output logic              rs485_driver_enable,  // pin, 1: drive the bus

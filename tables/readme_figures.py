@@ -59,7 +59,7 @@ def collected() -> dict[str, Figure]:
     order = [*FIRST, *(name for name in modules() if name not in FIRST)]
     found: dict[str, Figure] = {}
     for module in order:
-        found |= import_module(f"figures.{module}").FIGURES
+        found |= getattr(import_module(f"figures.{module}"), "FIGURES", {})
     return found
 
 

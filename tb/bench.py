@@ -4,9 +4,11 @@
 SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside the results, under
                                             build/)
 NETLIST=ecp5|ice40     the netlist that Yosys makes of the module, in place of its RTL
-POWER_UP=number        Verilator, with flip-flops and memories that start in this random state
 RTL_COVERAGE=folder    Verilator, which writes a file of coverage counts for each passed test there
 MUTANTS=file           the netlist of a block with its mutants, for mutation.blocks
+POWER_UP=number        Verilator, with flip-flops and memories that start in this random state, some
+                       cycles before the reset, and a reset of random length
+CROSSINGS=number       each change of an asynchronous input may arrive one cycle later, by chance
 """
 
 import fcntl
@@ -25,12 +27,11 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
-from twin import build as twin_build
 from mutation import block
-from twin import netlist
+from twin import build as twin_build
+from twin import crossings, netlist
 
 ROOT = Path(__file__).resolve().parent.parent
-RANDOM_STATE = ["+verilator+rand+reset+2"]  # what Verilator's X of the power-up becomes: random
 BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself
 WAIVERS = [
     ROOT / "rtl" / "cpu" / "cores.vlt"
@@ -44,17 +45,22 @@ def package(name):
 
 
 def search_path():
-    """Every folder in which a module is found by its name: the rooms of rtl/, and the packages of
-    the soft cores.
+    """Every folder in which a module is found by its name: the model of the crossings, the rooms of
+    rtl/, and the packages of the soft cores.
     """
     rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
     cores = package("pythondata_cpu_picorv32"), package("pythondata_cpu_serv")
     places = "verilog", "verilog/rtl"
-    return rooms + [core / place for core, place in zip(cores, places, strict=True) if core]
+    return (
+        crossings.folders()
+        + rooms
+        + [core / place for core, place in zip(cores, places, strict=True) if core]
+    )
 
 
 def source_of(top):
-    found = list((ROOT / "rtl").rglob(f"{top}.sv"))
+    modelled = [path for d in crossings.folders() for path in d.glob(f"{top}.sv")]
+    found = modelled or list((ROOT / "rtl").rglob(f"{top}.sv"))
     assert len(found) == 1, (
         f"there must be exactly one {top}.sv under rtl/, "
         f"found {[str(p.relative_to(ROOT)) for p in found]}"
@@ -138,7 +144,7 @@ def run(top, test, **parameters):
     if power_up:
         assert sim == "verilator", "Icarus has no random states: POWER_UP needs Verilator"
         args = [*args, "--x-initial", "unique", "--x-assign", "unique"]
-    plusargs = RANDOM_STATE + [f"+verilator+seed+{power_up}"] if power_up else []
+    plusargs = crossings.plusargs() + random_state(power_up)
     if counts:
         assert sim == "verilator", "only Verilator counts coverage"
         args = [*args, "--coverage-line", "--coverage-toggle"]
@@ -160,6 +166,7 @@ def run(top, test, **parameters):
     print(f"{what}, SEED={number}", flush=True)
     again = f"SIM={sim} SEED={number}" + (f" NETLIST={family}" if family else "")
     again += f" POWER_UP={power_up}" if power_up else ""
+    again += f" CROSSINGS={crossings.seed()}" if late else ""
     failed = f"{what}: {{}}. Again: make test K={name.split('[')[0]} {again}"
     try:
         count, wrong = results(
@@ -172,6 +179,7 @@ def run(top, test, **parameters):
                 waves=waves,
                 plusargs=plusargs,
                 extra_env=environment,
+                plusargs=crossings.plusargs() + random_state(power_up),
             )
         )
     except (
@@ -190,6 +198,11 @@ def run(top, test, **parameters):
     if counts:
         Path(counts).mkdir(parents=True, exist_ok=True)
         shutil.copy(own / "coverage.dat", Path(counts) / f"{tag}.{own.name}.dat")
+
+
+def random_state(power_up):
+    """The arguments with which Verilator makes the state after power-up random."""
+    return ["+verilator+rand+reset+2", f"+verilator+seed+{power_up}"] if power_up else []
 
 
 def of_netlist(sim, family, source, parameters):
@@ -230,6 +243,14 @@ def rtl_only(reason):
         pytest.skip(reason)
 
 
+def steady_only(reason):
+    """In a cocotb test: skip it if a change at a pin may arrive one cycle later, for a reason such
+    as a latency to the cycle.
+    """
+    if crossings.seed():
+        pytest.skip(reason)
+
+
 def results(path):
     """(how many tests ran, how many of them were wrong) from the file of results; what was skipped
     did not run.
@@ -252,12 +273,20 @@ def needs(condition, reason):
 
 async def start(dut, period_ns=10, **inputs):
     """Clock running, inputs at the given levels, two cycles of reset; returns just after reset
-    falls.
+    falls. With POWER_UP in the environment, the reset takes two to nine cycles and comes up to 15
+    cycles after the clock.
     """
+    before, length = 0, 2
+    if power_up := os.environ.get("POWER_UP"):
+        chance = random.Random(f"{power_up} {dut._name}")
+        before, length = chance.randrange(16), chance.randrange(2, 10)
     for name, level in inputs.items():
         getattr(dut, name).value = level
-    dut.rst.value = 1
+    dut.rst.value = int(before == 0)
     Clock(dut.clk, period_ns, "ns", impl="gpi").start(start_high=False)
-    for _ in range(2):
+    for _ in range(before):
+        await RisingEdge(dut.clk)
+    dut.rst.value = 1
+    for _ in range(length):
         await RisingEdge(dut.clk)
     dut.rst.value = 0

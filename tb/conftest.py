@@ -19,7 +19,7 @@ SIMULATES = re.compile(
     r"\brun\([^()]*(\([^()]*\))?[^()]*__file__"
 )  # a test of a block has a netlist
 LONG = ("docs", "system", "control", "twin", "peripheral", "netlist")  # folders, the longest first
-NODE_TESTS = ("test_twin.py", "test_s0_stage.py")  # of a node, which run on its netlist too
+NODE_TESTS = ("test_twin.py", "test_s0_stage.py")  # of a node: on its netlist, in random states
 
 
 def of_block(item):
@@ -28,8 +28,9 @@ def of_block(item):
 
 
 def on_node(item):
-    """Whether a test runs the twin of a node, and there is a netlist of it: the ECP5's."""
-    return os.environ.get("NETLIST") == "ecp5" and item.path.name in NODE_TESTS
+    """Whether a test runs the twin of a node, in a random state or on the netlist: the ECP5's."""
+    chosen = os.environ.get("POWER_UP") or os.environ.get("NETLIST") == "ecp5"
+    return bool(chosen) and item.path.name in NODE_TESTS
 
 
 def pytest_collection_modifyitems(config, items):

@@ -11,7 +11,7 @@ module top (
     input  wire        rs485_rx,             // pin, idles high
     output logic       rs485_tx,             // pin, idles high
     output logic       rs485_driver_enable,  // pin, 1: drive the bus
-    input  wire  [3:0] address,              // switches, address of the node on the bus
+    input  wire  [3:0] address,              // switches, address of the node, static
     output logic [7:0] led,                  // see the assignment
     input  wire        estop_open,           // pin, 1: pressed or wire cut
     // scale
@@ -19,8 +19,8 @@ module top (
     input  wire        encoder_b,            // pin
     input  wire        encoder_z,            // pin, index
     input  wire  [1:0] probe,                // pins of the touch probes
-    input  wire        adc_sin,              // pin, serial data
-    input  wire        adc_cos,              // pin, serial data
+    input  wire        adc_sin,              // pin, serial data, synchronous to adc_sclk
+    input  wire        adc_cos,              // pin, serial data, synchronous to adc_sclk
     output logic       adc_cs_n,             // pin, low during a conversion
     output logic       adc_sclk,             // pin, idles high
     // machine

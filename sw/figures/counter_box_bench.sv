@@ -8,7 +8,7 @@ module counter_box_bench #(
 ) (
     input  wire        clk,
     input  wire        rst,
-    input  wire  [3:0] address,
+    input  wire  [3:0] address,              // static
     input  wire        rs485_rx,
     output logic       rs485_tx,
     output logic       rs485_driver_enable,
@@ -19,7 +19,7 @@ module counter_box_bench #(
     output logic       flash_cs_n,
     output logic       flash_sclk,
     output logic       flash_mosi,
-    input  wire        flash_miso
+    input  wire        flash_miso            // synchronous to flash_sclk
 );
     wire [3:0] adc_cs_n, adc_sclk, compare_pulse, bridge_a, bridge_b, step, direction;
     wire [3:0] dac_cs_n, dac_sclk, dac_sdi, drive_enable;

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of the netlists: the tests of the blocks and of a node on what Yosys makes of them, the
-blocks after a power-up in any state, and whether two builds of one source are the same.
+same after a power-up in any state, and whether two builds of one source are the same. And their
+tests with inputs that may arrive one cycle later, as a campaign.
 """
 
 import hashlib
@@ -10,7 +11,8 @@ import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from campaigns.campaign import Campaign, Counts
@@ -23,6 +25,7 @@ BUILD = ROOT / "build" / "netlist"
 LONGEST_S = 24 * 3600
 ROOMS = "tb/netlist/test_rooms.py"  # one small block of each directory
 POWER_UPS = 3  # random states after power-up, of each block
+SEEDS = 3  # of the crossings
 REFERENCE = Path(__file__).with_name("bitstream.sha256")
 SMALL = "uart_tx"  # the block of which a bitstream is built twice
 SYNTHESIS = (
@@ -76,7 +79,9 @@ def netlist_failures(whole: bool = True, words: str = "") -> float:
 
 
 def power_up_failures(states: int = POWER_UPS, words: str = "", seed: int = 1) -> float:
-    """Failed tests of the blocks on RTL whose flip-flops and memories start in random states."""
+    """Failed tests of the blocks and of a node on RTL whose flip-flops and memories start in random
+    states.
+    """
     total = 0
     for state in range(seed, seed + states):
         ran, wrong = failed("tb", words, {"POWER_UP": str(state)})
@@ -155,8 +160,8 @@ FIGURES = {
     "power_up_failures": Figure(
         power_up_failures,
         "tests",
-        "failed unit tests of all blocks whose flip-flops and memories start in random states, 3 "
-        "states",
+        "failed tests of all blocks and of a node whose flip-flops and memories start in random "
+        "states, 3 states",
         "0",
         Quick({"states": 1, "words": "test_half_duplex"}, "one small block, one state"),
         0,
@@ -166,15 +171,22 @@ FIGURES = {
 
 DIRECTORIES = sorted(path.name for path in (ROOT / "rtl").iterdir() if path.is_dir())
 NODE = "tb/twin/test_twin.py"
-RUNS: list[tuple[str, dict[str, str]]] = [  # tests and their environment; a seed makes POWER_UP
+Runs = Sequence[tuple[str, Mapping[str, str]]]  # tests and their environment; "": the seed
+RUNS: Runs = [
     *((f"tb/{name}", {"NETLIST": family}) for family in FAMILIES for name in DIRECTORIES),
     (NODE, {"NETLIST": "ecp5"}),
     *((f"tb/{name}", {"POWER_UP": ""}) for name in DIRECTORIES),
+    (NODE, {"POWER_UP": ""}),
 ]
+CROSSED = (  # where a synchroniser is in what is tested
+    *("tb/common/test_synchroniser.py", "tb/sense", "tb/peripheral", "tb/serial", NODE),
+    *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "tb" / "system").glob("test_*.py")),
+)
+CROSSINGS_RUNS: Runs = [(tests, {"CROSSINGS": ""}) for _ in range(SEEDS) for tests in CROSSED]
 
 
-def tests_of_part(part: int, seed: int) -> Counts:
-    tests, environment = RUNS[part]
+def tests_of_part(runs: Runs, part: int, seed: int) -> Counts:
+    tests, environment = runs[part]
     chosen = {name: value or str(seed) for name, value in environment.items()}
     ran, wrong = failed(tests, "", chosen)
     return {"tests": ran, "failed": wrong}
@@ -183,10 +195,18 @@ def tests_of_part(part: int, seed: int) -> Counts:
 CAMPAIGNS = {
     "netlist": Campaign(
         "tests of the blocks of each directory on the netlists for ECP5 and iCE40, those of a node "
-        "on its netlist, and those of the blocks from random states; failed: tests",
-        tests_of_part,
+        "on its netlist, and those of both from random states; failed: tests",
+        partial(tests_of_part, RUNS),
         parts=len(RUNS),
         tried="tests",
         failed="failed",
-    )
+    ),
+    "crossings": Campaign(
+        "system tests and tests of blocks with synchronisers, where each change of an asynchronous "
+        f"input may arrive one cycle later, {SEEDS} seeds; failed: tests",
+        partial(tests_of_part, CROSSINGS_RUNS),
+        parts=len(CROSSINGS_RUNS),
+        tried="tests",
+        failed="failed",
+    ),
 }

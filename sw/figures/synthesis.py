@@ -78,9 +78,9 @@ def cores() -> list[Path]:
     return folders
 
 
-def yosys(source: Path, parameters: Parameters, last: str, tag: str) -> Path:
+def yosys(source: Path, parameters: Parameters, last: str, tag: str, boxes: str = "") -> Path:
     """The netlist that Yosys writes of a source file's module, in a directory of its own; `last`
-    are the passes after the elaboration.
+    are the passes after the elaboration, `boxes` files of modules that stay empty.
     """
     top = source.stem
     chosen = [f"{name}{Path(str(value)).name}" for name, value in parameters.items()]
@@ -90,6 +90,7 @@ def yosys(source: Path, parameters: Parameters, last: str, tag: str) -> Path:
     netlist = folder / "netlist.json"
     change = "".join(f" -set {name} {quoted(value)}" for name, value in parameters.items())
     passes = [
+        f"read_verilog -sv -lib {boxes}" if boxes else "",
         f"read_verilog -sv {source.relative_to(ROOT)}",
         f"chparam{change} {top}" if change else "",
         f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in libraries)}",

@@ -5,7 +5,9 @@ it and the machines.
 Everything lies under build/twin/<hash of all that goes in>, so nothing is built twice. The firmware
 is no part of it: it is written into the nodes' memory when a twin is made. With TWIN_SHORT_RUNS=1
 in the environment, as in tests, a library is built in a fifth of the time, unless the usual one is
-there already.
+there already. With CROSSINGS=seed in the environment, each change of an asynchronous input may
+arrive one cycle later; with POWER_UP=seed, flip-flops and memories of a node start in a random
+state.
 
     python -m twin.build          builds both libraries and the firmware, and prints their paths
 """
@@ -24,7 +26,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from firmware import build as firmware_build
-from twin import netlist, registers, rising_edge, statements
+from twin import crossings, netlist, registers, rising_edge, statements
 from twin.parameters import tables as parameters
 
 HERE = Path(__file__).resolve().parent
@@ -56,15 +58,28 @@ COMPILE = [
 VERILATE = [
     "--cc",
     "-O3",
-    "--x-assign",
-    "fast",
-    "--x-initial",
-    "fast",
     "--no-timing",
     "--timescale",
     "1ns/1ps",
     "-Wall",
 ]
+STATES = {  # of flip-flops after power-up: all 0, or random
+    False: ["--x-assign", "fast", "--x-initial", "fast"],
+    True: ["--x-assign", "unique", "--x-initial", "unique"],
+}
+# `rising_edge` by Verilator's own evaluation, twice a cycle: with the inputs, and at the edge
+BOTH_LEVELS = """struct Rest {  // nothing rests
+    void forget() {}
+};
+#include "nodes/registers.h"
+const std::vector<twin::Register> REGISTERS;  // none can be flipped
+inline void rising_edge(Vnode___024root& pins, Rest&) {
+    for (int level = 0; level < 2; level++) {
+        pins.clk = level;
+        pins.vlSymsp->__Vm_modelp->eval();
+    }
+}
+"""
 BY_PRODUCTS = ("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat", "*.gcda")
 VERILATED = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
 # The twin is compiled twice, for a fifth less time a cycle: the first library counts in a short run
@@ -124,6 +139,13 @@ def for_short_runs() -> bool:
 def compile_flags() -> list[str]:
     """How Verilated C++ is compiled once."""
     return COMPILE_SOON if for_short_runs() else COMPILE
+
+
+def verilate_flags() -> list[str]:
+    """How Verilator makes C++: after power-up all is 0 or, with POWER_UP in the environment, in a
+    random state.
+    """
+    return [*VERILATE, *STATES[bool(os.environ.get("POWER_UP"))]]
 
 
 def learns(tool: str) -> bool:
@@ -238,9 +260,15 @@ def common_objects() -> Path:
 
 
 def rtl_path() -> list[Path]:
-    """Every folder in which a module is found by its name."""
+    """Every folder in which a module is found by its name: the model of the crossings first."""
     directories = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
-    return directories + [package(name, "a soft core") / place for name, place in CORES.items()]
+    cores = [package(name, "a soft core") / place for name, place in CORES.items()]
+    return crossings.folders() + directories + cores
+
+
+def rtl_sources() -> list[Path]:
+    """All files of the RTL, and those that are found before them."""
+    return sorted(p for d in (ROOT / "rtl", *crossings.folders()) for p in d.rglob("*.sv"))
 
 
 def runtime(tool: str, verilator: Path, vpi: bool = False) -> Path:
@@ -289,7 +317,7 @@ def verilate(
     run(
         [
             verilator / "bin" / "verilator_bin",
-            *VERILATE,
+            *verilate_flags(),
             "--prefix",
             prefix,
             "--top-module",
@@ -315,7 +343,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
     flags = compile_flags()
     support, files = (
         runtime(tool, verilator),
-        [driver, source, *sorted((ROOT / "rtl").rglob("*.sv")), *DRIVER_HEADERS],
+        [driver, source, *rtl_sources(), *DRIVER_HEADERS],
     )
     own, include = [], [f"-I{FIRMWARE}", f"-I{HERE.parent}"]
     if firmware:
@@ -372,7 +400,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
         files,
         tool,
         flags,
-        VERILATE,
+        verilate_flags(),
         parameters,
         (verilator / "bin" / "verilator_bin").stat().st_size,
     )
@@ -382,7 +410,9 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
 def verilate_node(
     folder: Path, verilator: Path, clk_hz: int, axes: int, node: Mapping[str, int]
 ) -> None:
-    """C++ of a node, and the header that names its memory."""
+    """C++ of a node, and the header that names its memory. Random crossings read a pin more than
+    once, which sw/twin/rising_edge.py does not handle: Verilator evaluates such a node itself.
+    """
     values = {
         "CLK_HZ": clk_hz,
         "AXES": axes,
@@ -411,9 +441,11 @@ def verilate_node(
             "has node_memory been renamed?"
         )
     try:
-        design = rising_edge.Design.read(folder)
-        evaluation = rising_edge.function(design)
-        registers_of_node = registers.header(folder, design)
+        if crossings.seed():
+            evaluation = BOTH_LEVELS
+        else:
+            design = rising_edge.Design.read(folder)
+            evaluation = rising_edge.function(design) + registers.header(folder, design)
     except statements.FormError as error:
         raise BuildError(
             f"Verilator's code is not as sw/twin/rising_edge.py expects: {error}"
@@ -425,7 +457,7 @@ def verilate_node(
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
         f"constexpr bool SERIAL_CORE = {'true' if values.get('HAS_SERIAL_CORE') else 'false'};\n"
-        f"#define NODE_MEMORY {words[0]}\n{evaluation}{registers_of_node}"
+        f"#define NODE_MEMORY {words[0]}\n{evaluation}"
     )
 
 
@@ -449,12 +481,10 @@ def netlist_of_node(
 def verilate_netlist(
     folder: Path, verilator: Path, sources: Sequence[Path], clk_hz: int, axes: int
 ) -> None:
-    """C++ of the netlist of a node. Verilator evaluates it twice a cycle: with the inputs, and at
-    the rising edge.
-    """
+    """C++ of the netlist of a node."""
     run(
         [
-            *[verilator / "bin" / "verilator_bin", *VERILATE, "-Wno-lint", "-Wno-style"],
+            *[verilator / "bin" / "verilator_bin", *verilate_flags(), "-Wno-lint", "-Wno-style"],
             *["-Wno-fatal", "--prefix", "Vnode", "--top-module", "node", *sources],
             *["--Mdir", folder],
         ],
@@ -466,15 +496,7 @@ def verilate_netlist(
         "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
-        "constexpr bool SERIAL_CORE = false;\n"
-        "struct Rest {  // nothing of a netlist rests\n    void forget() {}\n};\n"
-        '#include "nodes/registers.h"\n'
-        "const std::vector<twin::Register> REGISTERS;  // its cells have no names\n"
-        "inline void rising_edge(Vnode___024root& pins, Rest&) {\n"
-        "    for (int level = 0; level < 2; level++) {\n"
-        "        pins.clk = level;\n"
-        "        pins.vlSymsp->__Vm_modelp->eval();\n"
-        "    }\n}\n"
+        f"constexpr bool SERIAL_CORE = false;\n{BOTH_LEVELS}"
     )
 
 
@@ -494,7 +516,7 @@ def twin_library(
     verilator = package("verilator", "it makes C++ of the RTL")
     sources = [
         *own_sources(),
-        *sorted((ROOT / "rtl").rglob("*.sv")),
+        *rtl_sources(),
         *sorted((ROOT / "rtl").rglob("*.vlt")),
         *cells,
         package("pythondata_cpu_picorv32", "the soft core") / "verilog" / "picorv32.v",
@@ -503,7 +525,7 @@ def twin_library(
 
     def folder_of(*flags: Sequence[str]) -> Path:
         design = (clk_hz, axes, sorted((node or {}).items()), tool, verilator_bytes)
-        return BUILD / f"twin-{digest(sources, *design, *flags)}"
+        return BUILD / f"twin-{digest(sources, *design, verilate_flags(), *flags)}"
 
     folder, soon = folder_of(COMPILE, COUNT_BRANCHES, USE_COUNTS), bool(cells) or for_short_runs()
     if (folder / "libtwin.so").exists():

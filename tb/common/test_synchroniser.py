@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of synchroniser: its latency, its state at reset, and random levels against the model."""
+"""Tests of synchroniser: its latency, its state at reset, and random levels against the model. With
+CROSSINGS=seed in the environment, of the one in whose place a change may arrive one cycle later.
+"""
 
 import random
 
@@ -7,12 +9,14 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start, steady_only
 from tb.common.synchroniser import Synchroniser
+from twin import crossings
 
 
 def model_of(dut):
-    return Synchroniser(int(dut.W.value), int(dut.STAGES.value), dut.RESET.value.to_signed())
+    sizes = int(dut.W.value), int(dut.STAGES.value), dut.RESET.value.to_signed()
+    return Synchroniser(*sizes)
 
 
 async def cycle(dut, d, rst=0):
@@ -24,6 +28,7 @@ async def cycle(dut, d, rst=0):
 
 @cocotb.test()
 async def latency_is_stages(dut):
+    steady_only("the latency is STAGES or one cycle more")
     await start(dut, d=0)
     stages = int(dut.STAGES.value)
     for _ in range(stages):
@@ -32,7 +37,25 @@ async def latency_is_stages(dut):
 
 
 @cocotb.test()
+async def with_crossings_half_of_the_changes_of_each_bit_arrive_one_cycle_later(dut):
+    needs(crossings.seed(), "the synchroniser of the RTL")
+    await start(dut, d=0)
+    stages, w = int(dut.STAGES.value), int(dut.W.value)
+    for bit in range(w):
+        for _ in range(stages + 1):
+            await cycle(dut, 0)
+        delays = []
+        for level in [1, 0] * 50:
+            arrived = [await cycle(dut, level << bit) >> bit & 1 for _ in range(stages + 3)]
+            delays.append(arrived.index(level) + 1)
+            assert arrived[delays[-1] :] == [level] * (stages + 3 - delays[-1]), "it stays there"
+        assert set(delays) == {stages, stages + 1}
+        assert 25 <= delays.count(stages) <= 75
+
+
+@cocotb.test()
 async def q_is_the_reset_level_from_reset_until_the_first_level_arrives(dut):
+    steady_only("the first level may arrive one cycle later")
     await start(dut, d=0)
     level, stages = model_of(dut).reset, int(dut.STAGES.value)
     other = ~level % (1 << int(dut.W.value))

@@ -12,7 +12,7 @@ from tb.sense.deglitcher import Deglitcher
 
 class Ps2Pass:
     def __init__(self, clk_hz):
-        self.synchronisers = [Synchroniser(reset=1) for _ in range(4)]
+        self.synchroniser = Synchroniser(4, reset=15, name="ps2_pass.u_synchroniser")
         self.deglitchers = [Deglitcher() for _ in range(4)]
         self.stable = clk_hz // 1_000_000
         self.levels, self.lines = [1] * 4, [1] * 4
@@ -55,5 +55,6 @@ class Ps2Pass:
         self.lines = [
             d.step(self.stable, level, rst)[0] for d, level in zip(self.deglitchers, self.levels)
         ]
-        self.levels = [s.step(level, rst) for s, level in zip(self.synchronisers, lines)]
+        word = self.synchroniser.step(sum(level << 3 - n for n, level in enumerate(lines)), rst)
+        self.levels = [word >> 3 - n & 1 for n in range(4)]
         return *self.host.pins()[-2:], *self.device.pins(1)[-2:]

@@ -11,7 +11,7 @@ SETTLE = 4  # cycles after reset in which the level follows the input
 class StatusInputs:
     def __init__(self, clk_hz, w=2):
         self.ms, self.w, self.age = clk_hz // 1000, w, 0  # age: cycles since reset
-        self.synchronisers = [Synchroniser() for _ in range(w)]
+        self.synchroniser = Synchroniser(w, name="status_inputs.u_inputs")
         self.now, self.level, self.stable = [0] * w, [0] * w, [0] * w
 
     def step(self, time_ms, inputs, rst=0):
@@ -32,7 +32,8 @@ class StatusInputs:
                 now if passes else level for now, level, passes in zip(self.now, self.level, ripe)
             ]
         self.age = 0 if rst else self.age + 1
-        self.now = [s.step(level, rst) for s, level in zip(self.synchronisers, inputs)]
+        word = self.synchroniser.step(sum(level << n for n, level in enumerate(inputs)), rst)
+        self.now = [word >> n & 1 for n in range(self.w)]
         return (
             self.level,
             [int(running and level > old) for level, old in zip(self.level, before)],

@@ -8,7 +8,7 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import run, start
+from tb.bench import run, start, steady_only
 from tb.sense.axis_inputs import PINS, AxisInputs
 
 PERIODS, LIMIT_TICK = 8, 3  # of the filter of a limit switch; cycles between its samples
@@ -48,6 +48,7 @@ class Inputs:
 
 @cocotb.test()
 async def latency_is_2_and_up_to_8_ticks_more_for_a_limit_switch(dut):
+    steady_only("a latency to the cycle")
     for pin, output in PINS.items():
         inputs = await Inputs(dut).reset()
         latency = SYNCHRONISER
@@ -62,6 +63,7 @@ async def latency_is_2_and_up_to_8_ticks_more_for_a_limit_switch(dut):
 
 @cocotb.test()
 async def a_limit_switch_that_bounces_is_filtered(dut):
+    steady_only("a filter time to the cycle")
     inputs = await Inputs(dut).reset()
     for _ in range(3):
         for _ in range((PERIODS - 1) * LIMIT_TICK):

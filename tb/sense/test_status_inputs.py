@@ -69,6 +69,7 @@ async def a_contact_that_bounces_changes_once(dut):
 
 @cocotb.test()
 async def pulses_shorter_than_time_ms_never_pass_and_those_of_1_ms_more_do(dut):
+    bench.steady_only("times to the cycle")
     for contacts_time in (0, 1, 2, 10):
         contacts = Contacts(dut)
         contacts.time_ms = contacts_time
@@ -85,6 +86,7 @@ async def pulses_shorter_than_time_ms_never_pass_and_those_of_1_ms_more_do(dut):
 
 @cocotb.test()
 async def latency_is_time_ms_to_1_ms_more_and_2_cycles(dut):
+    bench.steady_only("a latency to the cycle")
     contacts = await Contacts(dut).begin(0)
     seen = set()
     for n in range(2 * MS):

@@ -175,7 +175,8 @@ async def a_break_is_counted_and_the_next_frame_is_good(dut):
 @cocotb.test()
 async def a_glitch_is_no_start_bit_and_a_lost_stop_bit_ends_the_frame(dut):
     bus = await Bus(dut).begin()
-    await bus.clk(0)
+    for _ in range(2):  # of one cycle only, it may be lost on its way into the clock domain
+        await bus.clk(0)
     await bus.levels([1] * 12)
     assert await bus.read("start_glitches") == 1
     words = frame(0x20 | ADDRESS, b"\x07")

@@ -20,13 +20,17 @@ from moire.client.relay import (
     Status,
     identity_of,
 )
-from tb.bench import run, start
+from tb.bench import run, start, steady_only
 from tb.compensate.harmonic_map import exact, term_of
 from tb.relay.flash import Flash
 from tb.relay.relay_set import image
+from twin import crossings
 
 K, FIRST, SECOND, BIT = 2, 4096, 8192, 8
 COUNTS = 4000
+# The edges of the ring's index come with those of A and B. Behind the synchronisers they may come a
+# cycle before or after them, so without a gate the index may be found at the count next to it.
+GATED = dict(gate_mask=3, gate=0)
 IDLE = dict(encoder_a=0, encoder_b=0, encoder_z=0, rs485_rx=1, flash_sdi=1)
 KNOWN, LOADED, CORRECTING, READING = 1, 2, 4, 8
 ILLEGAL, WRONG_TURN, MISSING, REJECTED, BEHIND, REFUSED = 1, 2, 4, 8, 16, 32
@@ -175,7 +179,7 @@ async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
     terms = some_terms()
     relay = await Relay(dut).power_up(count=COUNTS - 60)
     await relay.booted()
-    await relay.send_set(image(terms, COUNTS))
+    await relay.send_set(image(terms, COUNTS, **GATED))
     assert not int(dut.correcting.value)
     await relay.go(50, clk_each=4)
     await relay.clk(40)
@@ -201,6 +205,7 @@ async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
 
 @cocotb.test()
 async def latency_is_10(dut):
+    steady_only("a latency to the cycle")
     assert await (await Relay(dut).power_up()).latencies() == [10] * 4
 
 
@@ -209,7 +214,7 @@ async def z_comes_once_a_turn_where_the_corrected_position_is_zero(dut):
     terms = [term_of(4.0, math.pi / 2), (0, 0)]
     relay = await Relay(dut).power_up(count=-20)
     await relay.booted()
-    await relay.send_set(image(terms, COUNTS, hysteresis=0))
+    await relay.send_set(image(terms, COUNTS, hysteresis=0, **GATED))
     await relay.go(100, clk_each=4)
     relay.index_at.clear()
     for steps in (-200, 200):
@@ -222,7 +227,7 @@ async def z_comes_once_a_turn_where_the_corrected_position_is_zero(dut):
 async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(dut):
     relay = await Relay(dut).power_up(count=-4)
     await relay.booted()
-    await relay.send_set(image(some_terms(), COUNTS))
+    await relay.send_set(image(some_terms(), COUNTS, **GATED))
     await relay.go(20)
     relay.with_index = False
     await relay.go(COUNTS + 10)
@@ -230,9 +235,10 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
     assert (await relay.clear(~MISSING & 0xFF)).flags == MISSING and (
         await relay.clear(MISSING)
     ).flags == 0
-    relay.count += 2
-    relay.show()
-    await relay.clk(30)
+    for _ in range(16 if crossings.seed() else 1):  # where A and B may arrive apart, some do not
+        relay.count += 2
+        relay.show()
+        await relay.clk(30)
     assert (await relay.status()).flags & ILLEGAL
 
 
@@ -240,7 +246,7 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
 async def a_glitch_is_rejected_and_flagged(dut):
     relay = await Relay(dut).power_up(count=-4)
     await relay.booted()
-    await relay.send_set(image(some_terms(0.001), COUNTS, filter_required=4))
+    await relay.send_set(image(some_terms(0.001), COUNTS, filter_required=4, **GATED))
     await relay.go(20, clk_each=8)
     dut.encoder_a.value = 1 - int(dut.encoder_a.value)
     await relay.clk(2)
@@ -344,7 +350,7 @@ async def flash_bytes_come_back(dut):
 async def reset_in_mid_flow(dut):
     relay = await Relay(dut).power_up(count=-4)
     await relay.booted()
-    await relay.send_set(image(some_terms(), COUNTS))
+    await relay.send_set(image(some_terms(), COUNTS, **GATED))
     await relay.go(30)
     await relay.send(Exchange(bytes([1, BEGIN_SET, 1, 2])).words_to_send()[:4])
     dut.rst.value = 1

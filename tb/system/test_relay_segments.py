@@ -6,13 +6,14 @@ directions and refuses other sets.
 import cocotb
 
 from moire.client.relay import identity_of
-from tb.bench import run
+from tb.bench import run, steady_only
 from tb.relay.relay_set import image
 from tb.system.test_relay import (
     BIT,
     CORRECTING,
     COUNTS,
     FIRST,
+    GATED,
     KNOWN,
     LOADED,
     REFUSED,
@@ -26,7 +27,7 @@ POINTS = 0.0, 3.5, -2.0, 6.25, 1.0  # counts at the borders
 
 def set_of(points):
     words = [round(value * 65536) for value in (*points, 0)]
-    return image(list(zip(words[::2], words[1::2])), COUNTS, segments=SEGMENTS)
+    return image(list(zip(words[::2], words[1::2])), COUNTS, segments=SEGMENTS, **GATED)
 
 
 def corrected(count):
@@ -57,6 +58,7 @@ async def it_corrects_by_the_table_in_both_directions(dut):
 
 @cocotb.test()
 async def latency_is_10(dut):
+    steady_only("a latency to the cycle")
     assert await (await Relay(dut).power_up()).latencies() == [10] * 4
 
 

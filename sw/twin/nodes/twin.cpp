@@ -6,9 +6,11 @@
 // the machines and the bus take the outputs of the nodes and set the pins for the next edge. One
 // translation unit with the Verilated code, so that all of it inlines.
 #include <algorithm>
+#include <cstdlib>
 #include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "nodes/bus.h"
 #include "devices/serial_flash.h"
@@ -24,10 +26,26 @@ constexpr uint32_t ALL_AXES = (1u << AXES) - 1;
 
 using Firmware = std::vector<uint32_t>;
 
+// The context of a node, with the seeds of the environment: CROSSINGS for its synchronisers, which
+// read it at their start, and POWER_UP for the state of its flip-flops and memories.
+inline VerilatedContext* context_of(unsigned address) {
+    auto* context = new VerilatedContext;
+    if (const char* seed = std::getenv("CROSSINGS")) {
+        const std::string argument = std::string("+crossings=") + seed + std::to_string(address);
+        const char* arguments[] = {"twin", argument.c_str()};
+        context->commandArgs(2, arguments);
+    }
+    if (const char* seed = std::getenv("POWER_UP"); seed && *seed) {
+        context->randReset(2);
+        context->randSeed(int(std::strtol(seed, nullptr, 10) * 16 + int(address) + 1));
+    }
+    return context;
+}
+
 class Core {  // a Verilated node and its clock
  public:
     Core(unsigned address, const Firmware& firmware)
-        : context_(new VerilatedContext), model_(new Vnode(context_.get())), pins(*model_->rootp) {
+        : context_(context_of(address)), model_(new Vnode(context_.get())), pins(*model_->rootp) {
         pins.clk = 0;
         pins.address = address;
         pins.rs485_rx = 1;

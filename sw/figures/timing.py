@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The timing of each build that ships, over ten placement seeds, as a campaign, and the table of
+its results in docs/boards.md.
+
+    make soak K=timing                    places all of them, for hours
+    python -m figures.timing [RESULTS]    writes the table from what is done so far of this version
+"""
+
+import re
+import shutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from campaigns.campaign import Campaign, Counts, Result
+from campaigns.store import Store
+from campaigns.version import commit, version
+from figures import area
+from figures.synthesis import BUILD, ECP5, UP5K, netlist_of, placed, source_of, yosys
+from tables import made_files
+from twin import build
+from twin.build import ROOT
+
+SEEDS = 10
+BOARDS = sorted(path.parent for path in (ROOT / "constraints").glob("*/board.mk"))
+PAGE = ROOT / "docs" / "boards.md"
+BEGIN, END = "<!-- timing -->", "<!-- /timing -->"
+RESULTS = "build/soak"
+NAME = "timing"
+
+
+@dataclass(frozen=True)
+class Build:
+    """A build that ships: how its netlist is made, where it is placed, and the clock that it must
+    reach.
+    """
+
+    words: str
+    netlist: Callable[[], Path]
+    family: str
+    part: Sequence[str]
+    clock_mhz: float
+    options: tuple[object, ...]
+
+
+ALONE = ("--lpf-allow-unconstrained", "--out-of-context")  # a node has more ports than pads
+FREE = ("--pcf-allow-unconstrained",)
+
+
+def of_node(parameters: area.Parameters) -> Callable[[], Path]:
+    return lambda: netlist_of(source_of("node"), parameters, "ecp5", 1)
+
+
+def of_board(folder: Path) -> Build:
+    """A board with its pins, part and clock, as `make board` builds it."""
+    text = (folder / "board.mk").read_text()
+    part, mhz = (re.search(rf"^{name} *:= *(.*)$", text, re.MULTILINE) for name in ("PART", "MHZ"))
+    if not part or not mhz:
+        raise ValueError(f"{folder.name}/board.mk states no PART or no MHZ")
+
+    def netlist() -> Path:
+        last = "synth_ecp5 -top {top} -json {netlist}"
+        return yosys(folder / "top.sv", {}, last, folder.name, "+/ecp5/cells_bb.v")
+
+    pins = ("--lpf", folder / "pins.lpf")
+    words = f"board `{folder.name}`, with its pins"
+    return Build(words, netlist, "ecp5", part[1].split(), float(mhz[1]), pins)
+
+
+BUILDS: dict[str, Build] = {  # the shortest first
+    "relay": Build(
+        "relay, 16 orders, iCE40 UP5K",
+        lambda: netlist_of(source_of("relay"), {"K": 16}, "ice40", 1),
+        *("ice40", UP5K, 24.0, FREE),
+    ),
+    "counter_box": Build(
+        "node that counts, iCE40 UP5K",
+        lambda: netlist_of(area.COUNTER_BOX, {}, "ice40", 1, area.SPRAM),
+        *("ice40", UP5K, 20.0, (*FREE, *area.FULL)),
+    ),
+    "s0_node": Build("S0 node, LFE5U-25F-6", of_node(area.S0_NODE), "ecp5", ECP5, 60.0, ALONE),
+    "node8_step": Build(
+        "node of 8 step axes, LFE5U-25F-6",
+        of_node({**area.STEP_AXES, "AXES": 8}),
+        *("ecp5", ECP5, 60.0, ALONE),
+    ),
+    "node4_sine": Build(
+        "node of 4 sine axes, LFE5U-25F-6",
+        of_node({**area.SINE_AXES, "AXES": 4}),
+        *("ecp5", ECP5, 60.0, ALONE),
+    ),
+    **{folder.name: of_board(folder) for folder in BOARDS},
+}
+
+
+def netlist_once(name: str) -> Path:
+    """The netlist of a build, made once for each version of the sources."""
+
+    def make(folder: Path) -> None:
+        build.firmware()
+        shutil.copy(BUILDS[name].netlist(), folder / "netlist.json")
+
+    return build.made_once(BUILD / f"{NAME}-{name}-{version()}", "netlist.json", make)
+
+
+def placement(part: int, seed: int) -> Counts:
+    """One placement: the first ten parts are those of the first build."""
+    name, number = list(BUILDS)[part // SEEDS], part % SEEDS
+    one = BUILDS[name]
+    netlist = netlist_once(name)
+    with TemporaryDirectory(dir=BUILD) as folder:
+        own = Path(shutil.copy(netlist, folder))
+        first = seed - part  # of the campaign
+        mhz, _ = placed(own, one.family, one.part, one.clock_mhz, first + number, *one.options)
+    return {"placements": 1, "slow": int(mhz < one.clock_mhz), f"{name}_ns": 1000 / mhz}
+
+
+def rows(results: Mapping[int, Result]) -> list[str]:
+    """The table: the worst and the best of the placements that are done."""
+    heads = ("build", "clock, MHz", "placements", "worst, MHz", "best, MHz")
+    found = ["", "| " + " | ".join(heads) + " |", "| --- | --- | --- | --- | --- |"]
+    for name, one in BUILDS.items():
+        times = [r.counts.get(f"{name}_ns") for r in results.values()]
+        mhz = sorted(1000 / float(ns) for ns in times if ns is not None)
+        cells = (f"{mhz[0]:.1f}", f"{mhz[-1]:.1f}") if mhz else ("not measured yet", "")
+        row = (one.words, f"{one.clock_mhz:g}", f"{len(mhz)} of {SEEDS}", *cells)
+        found.append("| " + " | ".join(row) + " |")
+    return [*found, "", f"Measured on commit {commit()}.", ""]
+
+
+def main() -> None:
+    store = Store(sys.argv[1] if len(sys.argv) > 1 else RESULTS)
+    parts = range(CAMPAIGNS[NAME].parts)
+    found = store.results(NAME, version(), 1, parts)
+    PAGE.write_text(made_files.filled(PAGE, BEGIN, END, rows(found)), encoding="utf-8")
+    print(f"{PAGE.relative_to(ROOT)}: {len(found)} of {len(parts)} placements")
+
+
+CAMPAIGNS = {
+    NAME: Campaign(
+        f"placements of the {len(BUILDS)} builds that ship, {SEEDS} seeds each; failed: those "
+        "slower than the clock of their build; the count is the longest period",
+        placement,
+        parts=SEEDS * len(BUILDS),
+        tried="placements",
+        failed="slow",
+        largest=tuple(f"{name}_ns" for name in BUILDS),
+    )
+}
+
+
+if __name__ == "__main__":
+    main()
