@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cycles among modules, and imports that go round the package system.
 
-- Python: the modules of moire, twin, campaigns, experiments, figures, fuzz, firmware, mutation,
-  tables, tools and tb import each other without a cycle, deferred imports included;
+- Python: the modules of moire, twin, boards, campaigns, experiments, figures, fuzz, firmware,
+  mutation, tables, tools and tb import each other without a cycle, deferred imports included;
 - nothing outside tb imports from tb, and moire imports none of the others;
 - nothing patches sys.path or loads a file by an import spec;
 - C and C++: a module is x.c with x.h; modules include each other without a cycle;
@@ -25,6 +25,7 @@ from tools import ROOT, exit_code
 PACKAGES = {
     "moire": "sw/host/moire",
     "twin": "sw/twin",
+    "boards": "sw/boards",
     "campaigns": "sw/campaigns",
     "experiments": "sw/experiments",
     "figures": "sw/figures",
