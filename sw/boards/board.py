@@ -222,9 +222,7 @@ def load(path: Path) -> Board:
             Pad(ball, f"switch {n}", "in", pull=switch_pull)
             for n, ball in enumerate(switches.words("pins"))
         ],
-        leds={
-            name: Pad(leds.take(name, str), f"LED {name}", "out") for name in led_names
-        },
+        leds={name: Pad(leds.take(name, str), f"LED {name}", "out") for name in led_names},
         leds_low=leds.take("low_is_on", bool, False),
         connectors={
             name: connector_of(connectors.table(name), name, buffer_part)

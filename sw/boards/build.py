@@ -10,10 +10,10 @@ python -m boards.build --board x --machine y [--only-files]
 
 import argparse
 import hashlib
-import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from boards import board as boards
 from boards import machine as machines
@@ -23,11 +23,21 @@ from boards.generate import BITSTREAM, CONSTRAINTS, files
 from boards.machine import Machine
 from boards.size import firmware_stem
 from boards.toml_file import ROOT, Misfit, shown
-from figures.synthesis import SynthesisError, cores, overfull, run
+from figures.synthesis import SynthesisError, placed, run, yosys
 from firmware import build as firmware
 
 OUT = ROOT / "build" / "boards"
 TOOLS = Path(sys.executable).parent
+CELLS = {  # the primitives of a family, for the PLL of the top
+    "ecp5": "read_verilog -lib +/ecp5/cells_bb.v",
+    "ice40": "read_verilog -lib +/ice40/cells_sim.v",
+}
+PLACED = {"ecp5": ("--lpf", "--textcfg"), "ice40": ("--pcf", "--asc")}  # options of nextpnr
+PACK = {"ecp5": ["yowasp-ecppack", "--compress"], "ice40": ["yowasp-icepack"]}
+USED = {  # words and cells of nextpnr's report
+    "ecp5": {"LUT": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAM": "DP16KD"},
+    "ice40": {"logic cells": "ICESTORM_LC", "block RAM": "ICESTORM_RAM"},
+}
 
 
 def fitting() -> list[Design]:
@@ -50,92 +60,65 @@ def write(design: Design) -> Path:
     return folder
 
 
-def make_firmware(design: Design, folder: Path) -> None:
+def make_firmware(design: Design, folder: Path) -> str:
+    """Builds the firmware of the node, and reports its size."""
     machine = design.machine
+    chosen = machine.image, len(machine.axes), machine.core
     try:
-        report = firmware.build(
-            1024 * machine.memory_kib, folder, False, machine.image, len(machine.axes), machine.core
-        )
+        return firmware.build(1024 * machine.memory_kib, folder, False, *chosen)
     except firmware.BuildError as why:
         raise Misfit(f"{machine.file}: {why}") from None
-    print(report)
-
-
-def libraries() -> list[Path]:
-    """The folders in which Yosys finds the modules below the top."""
-    return sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")}) + cores()
 
 
 def synthesise(design: Design, folder: Path) -> Path:
     """The netlist of the top."""
-    netlist, part = folder / "netlist.json", design.board.part
-    top = (folder / "top.sv").relative_to(ROOT)
-    cells = "+/ecp5/cells_bb.v" if part.family == "ecp5" else "+/ice40/cells_sim.v"
-    passes = [
-        f"read_verilog -lib {cells}",
-        f"read_verilog -sv {top}",
-        f"hierarchy -check -top top {' '.join(f'-libdir {each}' for each in libraries())}",
-        f"synth_{part.family} {part.synthesis} -top top -json {netlist.relative_to(ROOT)}",
-    ]
-    command = [sys.executable, ROOT / "tools" / "yosys.py", "; ".join(passes)]
-    run(command, "synthesis", folder / "synthesis.log")
-    return netlist
+    part = design.board.part
+    last = f"synth_{part.family} {part.synthesis} -top {{top}} -json {{netlist}}"
+    return yosys(folder / "top.sv", {}, last, f"board-{design.name}", CELLS[part.family])
 
 
-def place_command(design: Design, folder: Path, netlist: Path, seed: int) -> list[object]:
-    """The command of nextpnr, with paths from the root: a YoWASP tool has a /tmp of its own."""
+def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float, dict[str, Any]]:
+    """(MHz, utilization) after place and route; a clock that is not reached is a result. Paths are
+    those from the root, since a YoWASP tool has a /tmp of its own.
+    """
     part, here = design.board.part, folder.relative_to(ROOT)
-    pins = here / CONSTRAINTS[part.family]
-    speed = ["--speed", part.speed] if part.speed else []
-    written = ["--lpf", pins, "--textcfg"] if part.family == "ecp5" else ["--pcf", pins, "--asc"]
-    return [
-        TOOLS / f"yowasp-nextpnr-{part.family}",
-        *(f"--{part.device}", "--package", part.package, *speed, *part.place),
-        *("--json", netlist.relative_to(ROOT), *written, here / "placed"),
-        *("--freq", design.board.node_hz / 1e6, "--seed", seed, "--report", here / "report.json"),
-    ]
-
-
-def place(design: Design, folder: Path, netlist: Path, seed: int) -> None:
-    """Place and route; a clock that is not reached is an error."""
-    log = folder / "place_and_route.log"
-    try:
-        run(place_command(design, folder, netlist, seed), "place and route", log)
-    except SynthesisError as why:
-        if too_much := overfull(log):
-            raise SynthesisError(f"the design does not fit: it needs {too_much}") from None
-        raise why
+    chip = [f"--{part.device}", "--package", part.package]
+    chip += ["--speed", str(part.speed)] if part.speed else []
+    pins, written = PLACED[part.family]
+    return placed(
+        netlist,
+        part.family,
+        chip,
+        design.board.node_hz / 1e6,
+        seed,
+        *(*part.place, pins, here / CONSTRAINTS[part.family], written, here / "placed"),
+    )
 
 
 def pack(design: Design, folder: Path) -> Path:
     """The bitstream; for a serial core the image of the flash, with the firmware behind it."""
-    bitstream, here = folder / BITSTREAM, folder.relative_to(ROOT)
-    ecp5 = design.board.part.family == "ecp5"
-    command = ["yowasp-ecppack", "--compress"] if ecp5 else ["yowasp-icepack"]
-    words = [TOOLS / command[0], *command[1:], here / "placed", here / BITSTREAM]
+    made, here = folder / BITSTREAM, folder.relative_to(ROOT)
+    tool, *options = PACK[design.board.part.family]
+    words = [TOOLS / tool, *options, here / "placed", here / BITSTREAM]
     run(words, "packing", folder / "pack.log")
     if design.machine.core == "serial":
         program = (folder / f"{firmware_stem(design.machine)}.bin").read_bytes()
-        content, start = bitstream.read_bytes(), design.firmware_address
+        content, start = made.read_bytes(), design.firmware_address
         if len(content) > start:
-            raise SynthesisError(f"the bitstream has {len(content)} bytes, the firmware is at {start}")
-        bitstream.write_bytes(content.ljust(start, b"\xff") + program)
-    return bitstream
+            raise SynthesisError(
+                f"the bitstream has {len(content)} bytes, the firmware is at {start}"
+            )
+        made.write_bytes(content.ljust(start, b"\xff") + program)
+    return made
 
 
-def used(design: Design, folder: Path) -> str:
-    """What nextpnr reports: LUT or logic cells, block RAM, MHz."""
-    report = json.loads((folder / "report.json").read_text())
-    cells = {
-        "ecp5": {"LUT": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAM": "DP16KD"},
-        "ice40": {"logic cells": "ICESTORM_LC", "block RAM": "ICESTORM_RAM"},
-    }[design.board.part.family]
+def used(design: Design, utilization: Mapping[str, Any]) -> str:
+    """What a design takes of its part."""
     words = [
-        f"{report['utilization'][cell]['used']} of {report['utilization'][cell]['available']} {name}"
-        for name, cell in cells.items()
+        f"{utilization[cell]['used']} of {utilization[cell]['available']} {name}"
+        for name, cell in USED[design.board.part.family].items()
     ]
-    mhz = min(clock["achieved"] for clock in report["fmax"].values())
-    return f"{', '.join(words)}, {mhz:.1f} MHz of {design.board.node_hz / 1e6:g}"
+    return ", ".join(words)
 
 
 def state(folder: Path, made: Sequence[str]) -> str:
@@ -150,18 +133,23 @@ def state(folder: Path, made: Sequence[str]) -> str:
 
 def bitstream(design: Design, seed: int, say: Callable[[str], None]) -> Path:
     """The bitstream of a machine on a board; nothing is built if nothing has changed."""
-    folder = write(design)
-    say(f"{design.name}: {shown(folder / 'wiring.html')}")
-    make_firmware(design, folder)
+    folder, node_mhz = write(design), design.board.node_hz / 1e6
+    say(f"--- {design.name}: wiring: {shown(folder / 'wiring.html')}")
+    say(make_firmware(design, folder))
     note, now = folder / "note", f"{state(folder, list(files(design)))} seed {seed}"
-    if note.is_file() and note.read_text() == now and (folder / BITSTREAM).is_file():
+    if (folder / BITSTREAM).is_file() and note.is_file() and note.read_text() == now:
         return folder / BITSTREAM
     note.unlink(missing_ok=True)
-    say(f"{design.name}: synthesis (log: {shown(folder / 'synthesis.log')})")
+    say(f"--- {design.name}: synthesis")
     netlist = synthesise(design, folder)
-    log = shown(folder / "place_and_route.log")
-    say(f"{design.name}: place and route for {design.board.node_hz / 1e6:g} MHz (log: {log})")
-    place(design, folder, netlist, seed)
+    say(f"--- {design.name}: place and route for {node_mhz:g} MHz")
+    mhz, utilization = place(design, folder, netlist, seed)
+    say(f"{used(design, utilization)}, {mhz:.1f} MHz")
+    if mhz < node_mhz:
+        raise SynthesisError(
+            f"{design.name} reaches {mhz:.1f} MHz with seed {seed} and needs {node_mhz:g}: try "
+            "another SEED"
+        )
     made = pack(design, folder)
     note.write_text(now)
     return made
@@ -182,7 +170,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the placement")
     parser.add_argument("--only-files", action="store_true", help="run no tool")
     options = parser.parse_args()
-    say = lambda words: print(f"--- {words}", flush=True)
+    say = lambda words: print(words, flush=True)
     try:
         design = fit(*chosen(options.board, options.machine))
         if options.only_files:
@@ -191,7 +179,7 @@ def main() -> None:
         made = bitstream(design, options.seed, say)
     except (Misfit, SynthesisError) as why:
         sys.exit(f"board: {why}")
-    print(f"{design.name}: {shown(made)}: {used(design, made.parent)}")
+    print(f"{shown(made)}; load it with: {design.board.loader} {shown(made)}")
 
 
 if __name__ == "__main__":

@@ -64,7 +64,5 @@ def pll(family: str, input_hz: int, output_hz: int, file: str) -> Pll | None:
     best = (ecp5 if family == "ecp5" else ice40)(input_hz, output_hz)
     if not best or best[0].output_hz != output_hz:
         nearest = f"; the nearest is {best[0].output_hz:.0f} Hz" if best else ""
-        raise Misfit(
-            f"{file}: [clock] the PLL makes no {output_hz} Hz of {input_hz} Hz{nearest}"
-        )
+        raise Misfit(f"{file}: [clock] the PLL makes no {output_hz} Hz of {input_hz} Hz{nearest}")
     return best[0]

@@ -8,7 +8,7 @@ from boards.board import Board, Pad
 from boards.machine import DRIVES, FEATURES, Between, Machine, Signal, Wiring
 from boards.toml_file import Misfit
 
-HIGHEST_TICK_HZ = 4000  # servo tick that the firmware sets
+TICK_HZ = 4000  # servo tick that the firmware sets
 
 
 @dataclass(frozen=True)
@@ -148,6 +148,8 @@ def connected(board: Board, machine: Machine) -> list[Connection]:
         if signal.group not in wiring.between:
             raise Misfit(f"{machine.file}: {name} needs [between.{signal.group}]: part and volts")
         pad = pad_of(board, machine.file, name, wiring.pins[name], wiring.turned)
+        if signal.direction == "out":
+            pad = replace(pad, pull="none")
         found.append(Connection(name, signal, pad, wiring.between[signal.group]))
     return found
 
@@ -202,7 +204,7 @@ def check_part(board: Board, machine: Machine, needed: size.Size) -> None:
     if machine.core == "serial":
         if missing := [name for name in size.FLASH if name not in board.on_board]:
             raise Misfit(f"{machine.file}: a serial core needs {missing[0]}, {board.file} has none")
-    cycles = board.node_hz // HIGHEST_TICK_HZ
+    cycles = board.node_hz // TICK_HZ
     if (taken := size.tick_cycles(machine)) > cycles:
         raise Misfit(
             f"{machine.file}: a servo tick of {len(machine.axes)} axes takes {taken} cycles, but "
@@ -222,6 +224,4 @@ def fit(board: Board, machine: Machine) -> Design:
     check_part(board, machine, needed)
     pll = clocks.pll(board.part.family, board.clock_hz, board.node_hz, board.file)
     turned = wiring_for(board, machine).turned
-    return Design(
-        board, machine, connections, parameters(board, machine), pll, needed, turned
-    )
+    return Design(board, machine, connections, parameters(board, machine), pll, needed, turned)

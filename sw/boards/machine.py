@@ -249,9 +249,7 @@ def load(path: Path) -> Machine:
         segments=node.take("segments", int, 0),
         axes=[axis_of(row) for row in table.rows("axis")],
         unused=node.chosen("unused", NODE_SIGNALS),
-        wiring={
-            layout: wiring_of(layouts.table(layout), between) for layout in list(layouts.left)
-        },
+        wiring={layout: wiring_of(layouts.table(layout), between) for layout in list(layouts.left)},
     )
     for each in (node, table):
         each.close()

@@ -78,9 +78,9 @@ def cores() -> list[Path]:
     return folders
 
 
-def yosys(source: Path, parameters: Parameters, last: str, tag: str) -> Path:
+def yosys(source: Path, parameters: Parameters, last: str, tag: str, first: str = "") -> Path:
     """The netlist that Yosys writes of a source file's module, in a directory of its own; `last`
-    are the passes after the elaboration.
+    are the passes after the elaboration, `first` is one before the source is read.
     """
     top = source.stem
     chosen = [f"{name}{Path(str(value)).name}" for name, value in parameters.items()]
@@ -90,6 +90,7 @@ def yosys(source: Path, parameters: Parameters, last: str, tag: str) -> Path:
     netlist = folder / "netlist.json"
     change = "".join(f" -set {name} {quoted(value)}" for name, value in parameters.items())
     passes = [
+        first,
         f"read_verilog -sv {source.relative_to(ROOT)}",
         f"chparam{change} {top}" if change else "",
         f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in libraries)}",
@@ -122,12 +123,14 @@ def overfull(log: Path) -> str:
     return ", ".join(f"{n} {cell} of {most}" for cell, n, most in used if int(n) > int(most))
 
 
-def elaborated(source: Path, parameters: Parameters | None = None) -> float:
+def elaborated(
+    source: Path, parameters: Parameters | None = None, tag: str = "elaborated", first: str = ""
+) -> float:
     """How many word-level cells Yosys makes of a module and of those below it: a check that takes
     seconds of what synthesis takes minutes for.
     """
     last = "proc; flatten; opt_clean; write_json {netlist}"
-    netlist = yosys(source, parameters or {}, last, "elaborated")
+    netlist = yosys(source, parameters or {}, last, tag, first)
     return float(len(json.loads(netlist.read_text())["modules"][source.stem]["cells"]))
 
 
