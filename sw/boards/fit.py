@@ -198,8 +198,8 @@ def check_part(board: Board, machine: Machine, needed: size.Size) -> None:
     ):
         if need > most:
             raise Misfit(
-                f"{machine.file}: {len(machine.axes)} axes with {machine.memory_kib} KiB need about "
-                f"{need} {words}, but {part.name} of {board.file} has {most}"
+                f"{machine.file}: {len(machine.axes)} axes with {machine.memory_kib} KiB need "
+                f"about {need} {words}, but {part.name} of {board.file} has {most}"
             )
     if machine.core == "serial":
         if missing := [name for name in size.FLASH if name not in board.on_board]:

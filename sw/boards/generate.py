@@ -32,7 +32,7 @@ PERIPHERAL_INPUTS = {  # at the levels at which nothing happens
     **dict.fromkeys(("edm_clock", "edm_data", "peer_rx", "sensor_rx"), "1'b1"),
     "edm_status": "2'b00",
 }
-ROW, HEAD, PARTS_LEFT, WIDTH = 26, 30, 420, 860  # of the drawing
+ROW, HEAD, PARTS_LEFT, LETTER = 26, 30, 420, 8  # of the drawing, in its units
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def boxes(design: Design) -> list[dict[str, Any]]:
     top = 40
     for name, its_pins in design.board.connectors.items():
         used = {one.pad.place: one for one in design.connections}
-        rows = []
+        rows: list[dict[str, Any]] = []
         for pin in its_pins:
             one = used.get(f"{name} {pin}")
             if one is None:
@@ -196,8 +196,9 @@ def svg(design: Design) -> str:
     """The drawing: connector, pin, signal, level, and what is between."""
     drawn = boxes(design)
     height = drawn[-1]["top"] + drawn[-1]["height"] + 10 if drawn else 60
+    longest = max((len(one.between.part) for one in design.connections), default=0)
     return TEMPLATES.get_template("wiring.svg.jinja").render(
-        d=design, boxes=drawn, width=WIDTH, height=height, parts_left=PARTS_LEFT
+        d=design, boxes=drawn, width=PARTS_LEFT + 20 + LETTER * longest, height=height, parts_left=PARTS_LEFT
     )
 
 

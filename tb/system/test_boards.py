@@ -419,7 +419,8 @@ def test_more_axes_than_a_node_has_are_refused(tmp_path):
 
 
 def test_more_axes_than_the_part_holds_are_refused(tmp_path):
-    more = '[[axis]]\nname = "E"\nfeatures = ["capture"]\nunused = ["encoder_z", "probe_0", "probe_1"]\n\n'
+    more = '[[axis]]\nname = "E"\nfeatures = ["capture"]\n'
+    more += 'unused = ["encoder_z", "probe_0", "probe_1"]\n\n'
     path = edited(
         tmp_path,
         "constraints/machines/counter_box.toml",
