@@ -198,7 +198,11 @@ def svg(design: Design) -> str:
     height = drawn[-1]["top"] + drawn[-1]["height"] + 10 if drawn else 60
     longest = max((len(one.between.part) for one in design.connections), default=0)
     return TEMPLATES.get_template("wiring.svg.jinja").render(
-        d=design, boxes=drawn, width=PARTS_LEFT + 20 + LETTER * longest, height=height, parts_left=PARTS_LEFT
+        d=design,
+        boxes=drawn,
+        width=PARTS_LEFT + 20 + LETTER * longest,
+        height=height,
+        parts_left=PARTS_LEFT,
     )
 
 

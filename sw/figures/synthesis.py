@@ -129,7 +129,7 @@ def elaborated(
     """How many word-level cells Yosys makes of a module and of those below it: a check that takes
     seconds of what synthesis takes minutes for.
     """
-    last = "proc; flatten; opt_clean; write_json {netlist}"
+    last = "proc; flatten; opt_clean; blackbox =A:whitebox; write_json {netlist}"
     netlist = yosys(source, parameters or {}, last, tag, first)
     return float(len(json.loads(netlist.read_text())["modules"][source.stem]["cells"]))
 

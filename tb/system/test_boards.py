@@ -7,6 +7,8 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
 from amaranth_boards.icebreaker import ICEBreakerPlatform
@@ -15,6 +17,7 @@ from amaranth_boards.ulx3s import ULX3S_25F_Platform, ULX3S_85F_Platform
 from boards import board, build, clocks, generate, machine, size
 from boards.fit import fit
 from boards.toml_file import Misfit
+from figures.synthesis import SynthesisError
 from tb.bench import ROOT, WAIVERS, package, search_path
 
 DESIGNS = build.fitting()
@@ -142,6 +145,32 @@ def test_a_board_without_switches_has_the_address_of_the_machine():
         generate.inputs(fit(board.named("colorlight_i5"), machine.named("mill")))["address"]
         == "4'd1"
     )
+
+
+@pytest.fixture
+def packed(monkeypatch):
+    """pack() of the counter box with a packer that writes these bytes."""
+    design = fit(board.named("icebreaker"), machine.named("counter_box"))
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
+        folder = Path(name)
+        (folder / "counter_serial.bin").write_bytes(b"firmware")
+
+        def pack(bits):
+            write = lambda words, step, log: (ROOT / words[-1]).write_bytes(bits)
+            monkeypatch.setattr(build, "run", write)
+            return build.pack(design, folder).read_bytes()
+
+        yield pack
+
+
+def test_the_flash_has_the_firmware_where_the_node_reads_it(packed):
+    found = packed(b"bitstream")
+    assert found == b"bitstream" + b"\xff" * (0x20000 - 9) + b"firmware"
+
+
+def test_a_bitstream_that_reaches_into_the_firmware_is_refused(packed):
+    with pytest.raises(SynthesisError, match="the bitstream has 131073 bytes, the firmware is at"):
+        packed(b"x" * 131073)
 
 
 # Clocks and sizes
