@@ -80,6 +80,7 @@ def design_row(one: Design) -> list[str]:
 def make() -> dict[Path, str]:
     boards = [board.named(name) for name in board.names()]
     machines = [machine.named(name) for name in machine.names()]
+    designs, refused = fitting()
     lines = [
         *table(
             "board, what it is, part, clock of the node, pins, levels, bus",
@@ -88,8 +89,10 @@ def make() -> dict[Path, str]:
         *table("machine, what it is, axes, firmware", [machine_row(one) for one in machines]),
         *table(
             "command, LUT4 or logic cells by estimate, block RAMs by estimate, signals",
-            [design_row(one) for one in fitting()],
+            [design_row(one) for one in designs],
         ),
+        *(["", "Wired, but too large:", ""] * bool(refused)),
+        *(f"- {why}" for why in refused),
         "",
     ]
     return {PAGE: made_files.filled(PAGE, BEGIN, END, lines)}

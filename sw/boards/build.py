@@ -11,7 +11,7 @@ python -m boards.build --board x --machine y [--only-files]
 import argparse
 import hashlib
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from boards.fit import Design, fit
 from boards.generate import BITSTREAM, CONSTRAINTS, files
 from boards.machine import Machine
 from boards.size import firmware_stem
-from boards.toml_file import ROOT, Misfit, shown
+from boards.toml_file import ROOT, Misfit, TooLarge, shown
 from figures.synthesis import SynthesisError, elaborated, placed, run, yosys
 from firmware import build as firmware
 
@@ -40,15 +40,22 @@ USED = {  # words and cells of nextpnr's report
 }
 
 
-def fitting() -> list[Design]:
-    """Each machine of the project on each board that it is wired for."""
-    chosen = [machines.named(name) for name in machines.names()]
-    return [
-        fit(board, machine)
-        for board in map(boards.named, boards.names())
-        for machine in chosen
-        if board.layout in machine.wiring
-    ]
+def wired() -> Iterator[tuple[Board, Machine]]:
+    """Each machine of the project with each board that it is wired for."""
+    known = [machines.named(name) for name in machines.names()]
+    for board in map(boards.named, boards.names()):
+        yield from ((board, machine) for machine in known if board.layout in machine.wiring)
+
+
+def fitting() -> tuple[list[Design], list[str]]:
+    """What is wired: the designs that fit, and why parts are too small for the others."""
+    found, refused = [], []
+    for board, machine in wired():
+        try:
+            found.append(fit(board, machine))
+        except TooLarge as why:
+            refused.append(str(why))
+    return found, refused
 
 
 def write(design: Design) -> Path:
@@ -164,7 +171,7 @@ def bitstream(design: Design, seed: int, say: Callable[[str], None]) -> Path:
 def chosen(board_name: str, machine_name: str) -> tuple[Board, Machine]:
     """The board and the machine that are named; if one is missing, all that there are."""
     if not board_name or not machine_name:
-        rows = [f"  make board BOARD={d.board.name} MACHINE={d.machine.name}" for d in fitting()]
+        rows = [f"  make board BOARD={d.board.name} MACHINE={d.machine.name}" for d in fitting()[0]]
         raise Misfit("say which board and which machine:\n" + "\n".join(rows))
     return boards.named(board_name), machines.named(machine_name)
 

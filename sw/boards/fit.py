@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from boards import clocks, size
 from boards.board import Board, Pad
 from boards.machine import DRIVES, FEATURES, Between, Machine, Signal, Wiring
-from boards.toml_file import Misfit
+from boards.toml_file import Misfit, TooLarge
 
 TICK_HZ = 4000  # servo tick that the firmware sets
 
@@ -191,14 +191,15 @@ def check_bus(board: Board, machine: Machine) -> None:
 
 def check_part(board: Board, machine: Machine, needed: size.Size) -> None:
     """Refuses what the part cannot hold, by estimate."""
-    part = board.part
+    part, count = board.part, len(machine.axes)
+    counted = f"{count} axis" if count == 1 else f"{count} axes"
     for words, need, most in (
         ("block RAM", needed.block_ram, part.block_ram),
         ("LUT", needed.lut, part.lut),
     ):
         if need > most:
-            raise Misfit(
-                f"{machine.file}: {len(machine.axes)} axes with {machine.memory_kib} KiB need "
+            raise TooLarge(
+                f"{machine.file}: {counted} with {machine.memory_kib} KiB need "
                 f"about {need} {words}, but {part.name} of {board.file} has {most}"
             )
     if machine.core == "serial":

@@ -20,7 +20,11 @@ FEATURES = {
     "recorder": 100,
 }
 STEPPER = 730  # in an axis that has another drive
-BLOCK_RAM_KIB = 2  # of an ECP5, as Yosys fills it with a memory of bytes
+# Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of ten nodes)
+MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
+MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
+SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
+RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
 # An axis that counts: of the node of four of them on an iCE40, and the queue of its captures
 COUNTING_NODE, COUNTING_AXIS = 4672, 600
 ICE40_BLOCK_RAM, ICE40_CAPTURE = 4, 6
@@ -49,19 +53,32 @@ def axis_lut(axis: Axis) -> int:
     return base + more + STEPPER * both
 
 
+def ecp5_block_ram(machine: Machine) -> int:
+    """Block RAMs on an ECP5."""
+    axes = machine.axes
+    count = lambda name: sum(axis.has(name) for axis in axes)
+    found = MEMORY_STEP * -(-machine.memory_kib // MEMORY_STEP_KIB)
+    found += next(ram for most, ram in SETTINGS if len(axes) <= most)
+    found += RECORDER * count("recorder") + SEGMENT_TABLE * count("segments")
+    own = sum(axis.has("harmonics") and axis.has("own_chain") for axis in axes)
+    found += own - (own - count("harmonics")) // HARMONICS_AXES
+    if count("velocity"):
+        found += MICROCODE + ENGINE * -(-len(axes) // ENGINE_AXES)
+    return found
+
+
 def estimate(family: str, machine: Machine) -> Size:
     """The size of a node for this machine."""
     axes = machine.axes
-    captures = sum(axis.has("capture") for axis in axes)
     if family == "ice40":
         lut = COUNTING_NODE + (len(axes) - 4) * COUNTING_AXIS
         if machine.core == "soft":
             lut += STEP_NODE - 2 * STEP_AXIS
+        captures = sum(axis.has("capture") for axis in axes)
         return Size(lut, ICE40_BLOCK_RAM + ICE40_CAPTURE * captures)
     sine = any(axis.has("sine") for axis in axes)
     shared = SINE_NODE - 2 * SINE_AXIS if sine else STEP_NODE - 2 * STEP_AXIS
-    memory = -(-machine.memory_kib // BLOCK_RAM_KIB)
-    return Size(shared + sum(map(axis_lut, axes)), memory)
+    return Size(shared + sum(map(axis_lut, axes)), ecp5_block_ram(machine))
 
 
 def tick_cycles(machine: Machine) -> int:

@@ -18,6 +18,10 @@ class Misfit(Exception):
     """One line that says which file is wrong, where, and why."""
 
 
+class TooLarge(Misfit):
+    """A machine that the part of a board cannot hold."""
+
+
 def shown(path: Path) -> str:
     """The path of a file as messages name it: from the root of the project, if it is inside."""
     return os.path.relpath(path, ROOT) if path.resolve().is_relative_to(ROOT) else str(path)

@@ -20,7 +20,7 @@ from boards.toml_file import Misfit
 from figures.synthesis import SynthesisError
 from tb.bench import ROOT, WAIVERS, package, search_path
 
-DESIGNS = build.fitting()
+DESIGNS, TOO_LARGE = build.fitting()
 CELLS = {"ecp5": "ecp5/cells_bb.v", "ice40": "ice40/cells_sim.v"}
 ULX3S, MILL = "constraints/ulx3s_85f/board.toml", "constraints/machines/mill.toml"
 
@@ -201,6 +201,19 @@ def test_the_costs_of_features_are_those_that_the_page_lists():
     assert str(size.STEP_AXIS) in rows.values() and str(size.SINE_AXIS) in rows.values()
 
 
+def test_the_block_rams_are_those_of_netlists(tmp_path):
+    """Of nodes that were synthesised for an ECP5: 48 + 8 of the S0 node without its segment table,
+    32 + 10 of eight axes.
+    """
+    assert size.estimate("ecp5", machine.named("s0")).block_ram == 56 + 1
+    assert size.estimate("ecp5", machine.named("eight_axes")).block_ram == 42
+    assert size.estimate("ecp5", machine.named("mill")).block_ram == 38
+    assert TOO_LARGE == [
+        "constraints/machines/s0.toml: 1 axis with 96 KiB need about 57 block RAM, but "
+        "LFE5U-25F-6BG381C of constraints/ulx3s_25f/board.toml has 56"
+    ]
+
+
 # Pins of others
 
 
@@ -358,7 +371,7 @@ def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
         (
             "memory_kib = 64",
             "memory_kib = 2048",
-            "3 axes with 2048 KiB need about 1024 block RAM, ",
+            "3 axes with 2048 KiB need about 1030 block RAM, ",
         ),
         ("address = 1", "address = 0", "[node] address 0 must be 1 to 15"),
         ("address = 1", "address = 1\nsegments = 255", "[node] segments = 255, but no axis has"),
