@@ -25,9 +25,10 @@ MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
 SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
-# An axis that counts: of the node of four of them on an iCE40, and the queue of its captures
-COUNTING_NODE, COUNTING_AXIS = 4672, 600
-ICE40_BLOCK_RAM, ICE40_CAPTURE = 4, 6
+# On an iCE40 (make figure NAME=node_up5k_lc): the node of four axes that count in logic cells, the
+# LUT4 by which netlists of four and three of them differ, and the queue of an axis' captures
+COUNTING_NODE, COUNTING_AXIS = 4672, 562
+ICE40_BLOCK_RAM, ICE40_CAPTURE = 5, 6
 TICK, TICK_AXIS = 70, 365  # cycles of the motion engine (docs/engine.md)
 TICK_FILTERS = {0: 0, 2: 115, 4: 219}  # further cycles of an axis with so many biquads
 

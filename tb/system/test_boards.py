@@ -473,7 +473,7 @@ def test_more_axes_than_the_part_holds_are_refused(tmp_path):
     )
     found = refusal(lambda: fit(board.named("icebreaker"), machine.load(path)))
     assert found == (
-        f"{path}: 5 axes with 64 KiB need about 34 block RAM, but iCE40UP5K-SG48 of "
+        f"{path}: 5 axes with 64 KiB need about 35 block RAM, but iCE40UP5K-SG48 of "
         "constraints/icebreaker/board.toml has 30"
     )
 
