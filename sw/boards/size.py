@@ -57,12 +57,16 @@ def axis_lut(axis: Axis) -> int:
 def ecp5_block_ram(machine: Machine) -> int:
     """Block RAMs on an ECP5."""
     axes = machine.axes
-    count = lambda name: sum(axis.has(name) for axis in axes)
+
+    def count(*names: str) -> int:
+        """Axes that have all of these features."""
+        return sum(all(axis.has(name) for name in names) for axis in axes)
+
     found = MEMORY_STEP * -(-machine.memory_kib // MEMORY_STEP_KIB)
     found += next(ram for most, ram in SETTINGS if len(axes) <= most)
     found += RECORDER * count("recorder") + SEGMENT_TABLE * count("segments")
-    own = sum(axis.has("harmonics") and axis.has("own_chain") for axis in axes)
-    found += own - (own - count("harmonics")) // HARMONICS_AXES
+    own = count("harmonics", "own_chain")
+    found += own + -(-(count("harmonics") - own) // HARMONICS_AXES)
     if count("velocity"):
         found += MICROCODE + ENGINE * -(-len(axes) // ENGINE_AXES)
     return found
