@@ -17,6 +17,7 @@ from amaranth_boards.ulx3s import ULX3S_25F_Platform, ULX3S_85F_Platform
 from boards import board, build, clocks, generate, machine, size
 from boards.fit import fit
 from boards.toml_file import Misfit
+from figures import synthesis
 from figures.synthesis import SynthesisError
 from tb.bench import ROOT, WAIVERS, package, search_path
 
@@ -171,6 +172,28 @@ def test_the_flash_has_the_firmware_where_the_node_reads_it(packed):
 def test_a_bitstream_that_reaches_into_the_firmware_is_refused(packed):
     with pytest.raises(SynthesisError, match="the bitstream has 131073 bytes, the firmware is at"):
         packed(b"x" * 131073)
+
+
+def test_a_router_that_does_not_end_is_reported(monkeypatch):
+    monkeypatch.setattr(synthesis, "LONGEST_S", 0.1)
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
+        log = Path(name) / "place_and_route.log"
+        sleeps = [sys.executable, "-c", "import time; time.sleep(60)"]
+        with pytest.raises(SynthesisError) as why:
+            synthesis.run(sleeps, "place and route", log)
+        assert str(why.value) == (
+            "place and route has not ended after 0.0 minutes: try another seed "
+            f"(log: {log.relative_to(ROOT)})"
+        )
+
+
+def test_the_log_of_a_tool_that_fails_is_named_with_its_error():
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
+        log = Path(name) / "synthesis.log"
+        words = "import sys; print('ERROR: no way'); sys.stderr.write('bye'); sys.exit(1)"
+        with pytest.raises(SynthesisError) as why:
+            synthesis.run([sys.executable, "-c", words], "synthesis", log)
+        assert str(why.value).startswith("synthesis failed: ERROR: no way (log: build/")
 
 
 # Clocks and sizes
