@@ -23,7 +23,7 @@ from boards.generate import BITSTREAM, CONSTRAINTS, files
 from boards.machine import Machine
 from boards.size import firmware_stem
 from boards.toml_file import ROOT, Misfit, TooLarge, shown
-from figures.synthesis import SynthesisError, elaborated, placed, run, yosys
+from figures.synthesis import SynthesisError, placed, run, yosys
 from firmware import build as firmware
 
 OUT = ROOT / "build" / "boards"
@@ -82,12 +82,6 @@ def synthesise(design: Design, folder: Path) -> Path:
     part = design.board.part
     last = f"synth_{part.family} {part.synthesis} -top {{top}} -json {{netlist}}"
     return yosys(folder / "top.sv", {}, last, f"board-{design.name}", CELLS[part.family])
-
-
-def word_cells(design: Design, folder: Path) -> float:
-    """How many word-level cells Yosys makes of the top and of what is below it."""
-    first = CELLS[design.board.part.family]
-    return elaborated(folder / "top.sv", {}, f"elaborated-{design.name}", first)
 
 
 def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float, dict[str, Any]]:

@@ -27,7 +27,7 @@ SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
 # On an iCE40 (make figure NAME=node_up5k_lc): the node of four axes that count in logic cells, the
 # LUT4 by which netlists of four and three of them differ, and the queue of an axis' captures
-COUNTING_NODE, COUNTING_AXIS = 4672, 562
+COUNTING_NODE, COUNTING_AXIS = 4657, 562
 ICE40_BLOCK_RAM, ICE40_CAPTURE = 5, 6
 TICK, TICK_AXIS = 70, 365  # cycles of the motion engine (docs/engine.md)
 TICK_FILTERS = {0: 0, 2: 115, 4: 219}  # further cycles of an axis with so many biquads

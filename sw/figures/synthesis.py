@@ -133,14 +133,12 @@ def overfull(log: Path) -> str:
     return ", ".join(f"{n} {cell} of {most}" for cell, n, most in used if int(n) > int(most))
 
 
-def elaborated(
-    source: Path, parameters: Parameters | None = None, tag: str = "elaborated", first: str = ""
-) -> float:
+def elaborated(source: Path, parameters: Parameters | None = None) -> float:
     """How many word-level cells Yosys makes of a module and of those below it: a check that takes
     seconds of what synthesis takes minutes for.
     """
-    last = "proc; flatten; opt_clean; blackbox =A:whitebox; write_json {netlist}"
-    netlist = yosys(source, parameters or {}, last, tag, first)
+    last = "proc; flatten; opt_clean; write_json {netlist}"
+    netlist = yosys(source, parameters or {}, last, "elaborated")
     return float(len(json.loads(netlist.read_text())["modules"][source.stem]["cells"]))
 
 
