@@ -116,13 +116,8 @@ coverage: $(SETUP) $(FIRMWARE) ## what the tests reach of RTL, firmware and host
 	@$(PYTHON) -m code_coverage --jobs $(JOBS) $(if $(MINUTES),--minutes $(MINUTES))
 	@$(PYTHON) -m figures.figure coverage_line_pct coverage_branch_pct
 
-BOARDS := $(patsubst constraints/%/board.mk,%,$(wildcard constraints/*/board.mk))
-
-board:            ## the bitstream for a board: BOARD=one of the folders of constraints/
-	$(if $(filter $(BOARD),$(BOARDS)),,$(error say which: make board BOARD=x, with x one of: $(BOARDS)))
-ifneq ($(filter $(BOARD),$(BOARDS)),)
-include constraints/$(BOARD)/board.mk
-endif
+board: $(SETUP)   ## the bitstream and the wiring page of a machine on a board: BOARD=x MACHINE=y; docs/boards.md
+	@$(PYTHON) -m boards.build --board '$(BOARD)' --machine '$(MACHINE)' $(if $(SEED),--seed $(SEED))
 
 clean:            ## remove what was built; the tools in build/venv stay (rm -rf build removes them too)
 	@[ ! -d build ] || find build -mindepth 1 -maxdepth 1 ! -name venv -exec rm -rf {} +

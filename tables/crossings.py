@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from boards.build import fitting, write
 from figures.synthesis import yosys
 from tables import made_files
 from tables.made_files import ROOT
@@ -30,11 +31,11 @@ WHOLE: dict[str, dict[str, int | str]] = {  # the designs, with all that has pin
     },
     "relay": {},
 }
-TOPS = ("constraints/*/top.sv", "sw/figures/counter_box_bench.sv")  # around one node each
-CLOCKS = {"clk", "clk_25mhz"}
+BOX = ROOT / "sw" / "figures" / "counter_box_bench.sv"  # a top around a node, as those of boards
+CLOCKS = {"clk", "clock"}
 RESET = "rst"
 FLAT = "proc; flatten; opt_clean; write_json {netlist}"
-BOXES = "+/ecp5/cells_bb.v rtl/node.sv"  # of the tops
+BOXES = "read_verilog -sv -lib +/ecp5/cells_bb.v +/ice40/cells_sim.v rtl/node.sv"  # of the tops
 AROUND = "proc; opt_clean; write_json {netlist}"
 BITWISE = {"$mux": "AB", "$and": "AB", "$or": "AB", "$xor": "AB", "$not": "A"}
 FLIP_FLOP = re.compile(r"\$_?(s?dff|aldff|adff|dlatch|sr)")
@@ -227,10 +228,10 @@ def crossings_of(design: str, netlist: Netlist, comments: Mapping[str, str]) -> 
 
 
 def elaborated(
-    source: Path, parameters: Mapping[str, int | str], passes: str, boxes: str = ""
+    source: Path, parameters: Mapping[str, int | str], passes: str, first: str = ""
 ) -> Netlist:
-    """A module with everything below it but the modules of the files `boxes`."""
-    file = yosys(source, parameters, passes, "crossings", boxes)
+    """A module with everything below it but the modules that the pass `first` has read."""
+    file = yosys(source, parameters, passes, "crossings", first)
     return Netlist(json.loads(file.read_text())["modules"][source.stem])
 
 
@@ -255,7 +256,7 @@ def designs() -> dict[str, Path]:
 
 def tops() -> list[Path]:
     """The tops of boards and boxes."""
-    return sorted(path for pattern in TOPS for path in ROOT.glob(pattern))
+    return [BOX, *(write(design) / "top.sv" for design in fitting()[0])]
 
 
 def years(seconds: float) -> str:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cycles among modules, and imports that go round the package system.
 
-- Python: the modules of moire, twin, campaigns, code_coverage, experiments, figures, fuzz,
+- Python: the modules of moire, twin, boards, campaigns, code_coverage, experiments, figures, fuzz,
   firmware, mutation, study, tables, tools and tb import each other without a cycle, deferred
   imports included;
 - nothing outside tb imports from tb, and moire imports none of the others;
@@ -26,6 +26,7 @@ from tools import ROOT, exit_code
 PACKAGES = {
     "moire": "sw/host/moire",
     "twin": "sw/twin",
+    "boards": "sw/boards",
     "campaigns": "sw/campaigns",
     "code_coverage": "sw/code_coverage",
     "experiments": "sw/experiments",

@@ -19,6 +19,7 @@ from figures.common import Quick, seeds
 from twin.build import CORES, ROOT
 
 BUILD = ROOT / "build" / "synthesis"
+LONGEST_S = 3 * 3600  # of a tool; a router may find no way through a nearly full part, and try on
 PLACEMENTS = 3  # of a clock the worst is taken
 PADS = 150  # an inner block has more ports than the ECP5 has pads: it is placed without any
 ECP5 = ["--25k", "--package", "CABGA256", "--speed", "6"]  # LFE5U-25F-6
@@ -48,10 +49,19 @@ def run(command: Sequence[object], step: str, log: Path) -> None:
         str(c.relative_to(ROOT) if isinstance(c, Path) and c.is_relative_to(BUILD) else c)
         for c in command
     ]
-    done = subprocess.run(words, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    log.write_text(done.stdout + done.stderr)
+    quiet = subprocess.DEVNULL
+    with open(log, "w", encoding="utf-8") as output:
+        try:
+            done = subprocess.run(
+                words, cwd=ROOT, stdin=quiet, stdout=output, stderr=output, timeout=LONGEST_S
+            )
+        except subprocess.TimeoutExpired:
+            name, minutes = log.relative_to(ROOT), LONGEST_S // 60
+            raise SynthesisError(
+                f"{step} has not ended after {minutes} minutes: try another seed (log: {name})"
+            ) from None
     if done.returncode:
-        lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        lines = [line for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]
         errors = [line for line in lines if "ERROR" in line] or lines or ["without a word"]
         raise SynthesisError(f"{step} failed: {errors[-1]} (log: {log.relative_to(ROOT)})")
 
@@ -78,9 +88,9 @@ def cores() -> list[Path]:
     return folders
 
 
-def yosys(source: Path, parameters: Parameters, last: str, tag: str, boxes: str = "") -> Path:
+def yosys(source: Path, parameters: Parameters, last: str, tag: str, first: str = "") -> Path:
     """The netlist that Yosys writes of a source file's module, in a directory of its own; `last`
-    are the passes after the elaboration, `boxes` files of modules that stay empty.
+    are the passes after the elaboration, `first` is one before the source is read.
     """
     top = source.stem
     chosen = [f"{name}{Path(str(value)).name}" for name, value in parameters.items()]
@@ -90,7 +100,7 @@ def yosys(source: Path, parameters: Parameters, last: str, tag: str, boxes: str 
     netlist = folder / "netlist.json"
     change = "".join(f" -set {name} {quoted(value)}" for name, value in parameters.items())
     passes = [
-        f"read_verilog -sv -lib {boxes}" if boxes else "",
+        first,
         f"read_verilog -sv {source.relative_to(ROOT)}",
         f"chparam{change} {top}" if change else "",
         f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in libraries)}",

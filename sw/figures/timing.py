@@ -6,7 +6,6 @@ its results in docs/boards.md.
     python -m figures.timing [RESULTS]    writes the table from what is done so far of this version
 """
 
-import re
 import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -14,17 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from boards import build as boards
+from boards.fit import Design
 from campaigns.campaign import Campaign, Counts, Result
 from campaigns.store import Store
 from campaigns.version import commit, version
 from figures import area
-from figures.synthesis import BUILD, ECP5, UP5K, netlist_of, placed, source_of, yosys
+from figures.synthesis import BUILD, ECP5, UP5K, netlist_of, placed, source_of
 from tables import made_files
 from twin import build
 from twin.build import ROOT
 
 SEEDS = 10
-BOARDS = sorted(path.parent for path in (ROOT / "constraints").glob("*/board.mk"))
 PAGE = ROOT / "docs" / "boards.md"
 BEGIN, END = "<!-- timing -->", "<!-- /timing -->"
 RESULTS = "build/soak"
@@ -53,20 +53,22 @@ def of_node(parameters: area.Parameters) -> Callable[[], Path]:
     return lambda: netlist_of(source_of("node"), parameters, "ecp5", 1)
 
 
-def of_board(folder: Path) -> Build:
-    """A board with its pins, part and clock, as `make board` builds it."""
-    text = (folder / "board.mk").read_text()
-    part, mhz = (re.search(rf"^{name} *:= *(.*)$", text, re.MULTILINE) for name in ("PART", "MHZ"))
-    if not part or not mhz:
-        raise ValueError(f"{folder.name}/board.mk states no PART or no MHZ")
+def of_board(design: Design) -> Build:
+    """A machine on a board with its pins, part and clock, as `make board` builds it."""
+    folder = boards.OUT / design.name
 
     def netlist() -> Path:
-        last = "synth_ecp5 -top {top} -json {netlist}"
-        return yosys(folder / "top.sv", {}, last, folder.name, "+/ecp5/cells_bb.v")
+        boards.make_firmware(design, boards.write(design))
+        return boards.synthesise(design, folder)
 
-    pins = ("--lpf", folder / "pins.lpf")
-    words = f"board `{folder.name}`, with its pins"
-    return Build(words, netlist, "ecp5", part[1].split(), float(mhz[1]), pins)
+    return Build(
+        f"`{design.machine.name}` on the board `{design.board.name}`, with its pins",
+        netlist,
+        design.board.part.family,
+        boards.chip(design),
+        design.board.node_hz / 1e6,
+        tuple(boards.pinned(design, folder)),
+    )
 
 
 BUILDS: dict[str, Build] = {  # the shortest first
@@ -91,7 +93,7 @@ BUILDS: dict[str, Build] = {  # the shortest first
         of_node({**area.SINE_AXES, "AXES": 4}),
         *("ecp5", ECP5, 60.0, ALONE),
     ),
-    **{folder.name: of_board(folder) for folder in BOARDS},
+    **{design.name: of_board(design) for design in boards.fitting()[0]},
 }
 
 

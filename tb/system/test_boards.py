@@ -1,52 +1,537 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The boards of constraints/: each port of its top has one pin of its own, and the top fits the
-node as it is.
+"""Boards and machines of constraints/: whatever is made of them passes Verilator's lint and has one
+pin for each port, what does not fit is refused in one line, and the pins are those of others.
 """
 
+import os
 import re
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
+from amaranth_boards.icebreaker import ICEBreakerPlatform
+from amaranth_boards.ulx3s import ULX3S_25F_Platform, ULX3S_85F_Platform
 
-from tb.bench import ROOT, search_path
+from boards import board, build, clocks, generate, machine, size
+from boards.fit import fit
+from boards.toml_file import Misfit
+from figures import synthesis
+from figures.synthesis import SynthesisError
+from tb.bench import ROOT, WAIVERS, package, search_path
 
-BOARDS = sorted(path.parent for path in (ROOT / "constraints").glob("*/board.mk"))
-
-
-def ports(top):
-    """Names of the pads: a vector has one for each bit."""
-    declared = re.findall(
-        r"(?:input\s+wire|output\s+logic)\s+(?:\[(\d+):0\])?\s*(\w+)", top.read_text()
-    )
-    return [
-        name if high == "" else f"{name}[{n}]"
-        for high, name in declared
-        for n in range(int(high or 0) + 1)
-    ]
+DESIGNS, TOO_LARGE = build.fitting()
+CELLS = {"ecp5": "ecp5/cells_bb.v", "ice40": "ice40/cells_sim.v"}
+ULX3S, MILL = "constraints/ulx3s_85f/board.toml", "constraints/machines/mill.toml"
 
 
-@pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.name)
-def test_each_port_has_a_pin_of_its_own(board):
-    pins = re.findall(r'LOCATE COMP "([^"]+)" SITE "(\w+)"', (board / "pins.lpf").read_text())
-    assert sorted(name for name, _ in pins) == sorted(ports(board / "top.sv"))
-    assert len({site for _, site in pins}) == len(pins)
-    electrical = re.findall(r'IOBUF PORT "([^"]+)"', (board / "pins.lpf").read_text())
-    assert sorted(electrical) == sorted(name for name, _ in pins)
+def edited(folder, path, *changes):
+    """A copy of a board or machine file with some of its text replaced."""
+    text = (ROOT / path).read_text()
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    copy = folder / os.path.basename(path)
+    copy.write_text(text)
+    return copy
 
 
-@pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.name)
-def test_the_top_fits_the_node(board):
-    directories = " ".join(f"-libdir {directory}" for directory in search_path())
-    passes = (
-        f"read_verilog -lib +/ecp5/cells_bb.v; read_verilog -sv {board / 'top.sv'}; "
-        f"hierarchy -check -top top {directories}"
-    )
+def refusal(make):
+    """The one line with which something is refused."""
+    with pytest.raises(Misfit) as why:
+        make()
+    assert "\n" not in str(why.value)
+    return str(why.value)
+
+
+# What is made
+
+
+@pytest.mark.parametrize("design", DESIGNS, ids=lambda design: design.name)
+def test_the_top_of_each_machine_on_each_board_passes_lint(design, tmp_path):
+    top = tmp_path / "top.sv"
+    top.write_text(generate.top(design))
+    verilator = package("verilator")
+    folders = [word for folder in search_path() for word in ("-y", str(folder))]
+    cells = package("pyosys") / "share" / CELLS[design.board.part.family]
+    command = [verilator / "bin" / "verilator_bin", "--lint-only", "-Wall", "--quiet"]
+    command += ["--timescale", "1ns/1ps", *folders, "+libext+.sv+.v", "--top-module", "top"]
+    command += [*WAIVERS, ROOT / "constraints" / "cells.vlt", "-v", cells, top]
     done = subprocess.run(
-        [sys.executable, ROOT / "tools" / "yosys.py", passes],
+        command,
         cwd=ROOT,
+        env={**os.environ, "VERILATOR_ROOT": str(verilator)},
         capture_output=True,
         text=True,
     )
-    assert done.returncode == 0, done.stdout[-400:]
-    assert not re.search(r"not connected|Resizing cell port top", done.stdout)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("design", DESIGNS, ids=lambda design: design.name)
+def test_each_port_of_the_top_has_a_pin_of_its_own(design):
+    ports = re.findall(r"^    (?:input  wire |output logic) (\w+)", generate.top(design), re.M)
+    made = generate.files(design)
+    if design.board.part.family == "ecp5":
+        pins = re.findall(r'LOCATE COMP "(\w+)" SITE "(\w+)"', made["pins.lpf"])
+        electrical = re.findall(r'IOBUF PORT "(\w+)"', made["pins.lpf"])
+    else:
+        pins = re.findall(r"set_io (?:-pullup yes )?(\w+) (\w+)", made["pins.pcf"])
+        electrical = [port for port, _ in pins]
+    assert sorted(port for port, _ in pins) == sorted(ports) == sorted(electrical)
+    assert len({ball for _, ball in pins}) == len(pins)
+
+
+@pytest.mark.parametrize("design", DESIGNS, ids=lambda design: design.name)
+def test_page_and_drawing_name_each_connection(design):
+    made = generate.files(design)
+    for one in design.connections:
+        row = rf"<td>{one.pad.place}</td><td>{one.pad.ball}</td><td>{one.name}</td>"
+        assert row in made["wiring.html"]
+        assert f">{one.name}</text>" in made["wiring.svg"]
+        assert f">{one.between.part}</text>" in made["wiring.svg"]
+    assert made["wiring.svg"] in made["wiring.html"]
+    drawn = re.findall(r'<g class="(in|out)">', made["wiring.svg"])
+    assert drawn.count("in") == sum(one.signal.direction == "in" for one in design.connections)
+    assert len(drawn) == len(design.connections)
+
+
+def test_the_pins_of_s0_on_the_ulx3s_are_those_of_its_first_release():
+    """The pins of J1 and J2 as people have wired them."""
+    design = fit(board.named("ulx3s_85f"), machine.named("s0"))
+    found = {one.name: one.pad.ball for one in design.connections}
+    assert found["X.encoder_a"] == "B11" and found["X.encoder_z"] == "A10"
+    assert found["X.adc_cs_n"] == "C10" and found["estop_open"] == "C6"
+    assert found["X.drive_enable"] == "A6" and found["X.dac_sdi"] == "B4"
+    assert found["rs485_rx"] == "C18" and found["rs485_driver_enable"] == "B15"
+    assert len(found) == 25
+
+
+def test_only_inputs_have_pull_ups():
+    made = generate.files(fit(board.named("ulx3s_85f"), machine.named("mill")))["pins.lpf"]
+    assert 'IOBUF PORT "x_limit_low_open" PULLMODE=UP IO_TYPE=LVCMOS33;' in made
+    assert 'IOBUF PORT "x_drive_enable" PULLMODE=NONE IO_TYPE=LVCMOS33 DRIVE=4;' in made
+
+
+def test_masks_have_a_bit_for_each_axis_with_the_feature(tmp_path):
+    path = edited(
+        tmp_path,
+        "constraints/machines/counter_box.toml",
+        ('name = "B"\nfeatures = ["capture"]', 'name = "B"\nfeatures = ["velocity"]'),
+    )
+    found = fit(board.named("icebreaker"), machine.load(path)).parameters
+    assert (found["HAS_CAPTURE"], found["HAS_VELOCITY"], found["HAS_DRIVE"]) == (13, 2, 0)
+    assert (found["AXES"], found["CLK_HZ"], found["REGISTER_STYLE"]) == (4, 18_000_000, "huge")
+
+
+def test_inputs_without_a_pin_have_the_level_at_which_nothing_happens(tmp_path):
+    path = edited(
+        tmp_path,
+        MILL,
+        (
+            'name = "Y"\ndrives = ["stepper"]\nunused = [',
+            'name = "Y"\ndrives = ["stepper"]\nunused = ["drive_fault_n", "limit_low_open", ',
+        ),
+        ('Y.limit_low_open = "J1 gp6"\n', ""),
+        ('Y.drive_fault_n = "J1 gp7"\n', ""),
+    )
+    given = generate.inputs(fit(board.named("ulx3s_85f"), machine.load(path)))
+    assert given["drive_fault_n"] == "{z_drive_fault_n, 1'b1, x_drive_fault_n}"
+    assert given["limit_low_open"] == "{z_limit_low_open, 1'b0, x_limit_low_open}"
+    assert given["rs485_rx"] == "usb_rx & rs485_rx"
+
+
+def test_a_board_without_switches_has_the_address_of_the_machine():
+    assert (
+        generate.inputs(fit(board.named("colorlight_i5"), machine.named("mill")))["address"]
+        == "4'd1"
+    )
+
+
+@pytest.fixture
+def packed(monkeypatch):
+    """pack() of the counter box with a packer that writes these bytes."""
+    design = fit(board.named("icebreaker"), machine.named("counter_box"))
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
+        folder = Path(name)
+        (folder / "counter_serial.bin").write_bytes(b"firmware")
+
+        def pack(bits):
+            write = lambda words, step, log: (ROOT / words[-1]).write_bytes(bits)
+            monkeypatch.setattr(build, "run", write)
+            return build.pack(design, folder).read_bytes()
+
+        yield pack
+
+
+def test_the_flash_has_the_firmware_where_the_node_reads_it(packed):
+    found = packed(b"bitstream")
+    assert found == b"bitstream" + b"\xff" * (0x20000 - 9) + b"firmware"
+
+
+def test_a_bitstream_that_reaches_into_the_firmware_is_refused(packed):
+    with pytest.raises(SynthesisError, match="the bitstream has 131073 bytes, the firmware is at"):
+        packed(b"x" * 131073)
+
+
+def test_a_router_that_does_not_end_is_reported(monkeypatch):
+    monkeypatch.setattr(synthesis, "LONGEST_S", 0.1)
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
+        log = Path(name) / "place_and_route.log"
+        sleeps = [sys.executable, "-c", "import time; time.sleep(60)"]
+        with pytest.raises(SynthesisError) as why:
+            synthesis.run(sleeps, "place and route", log)
+        assert str(why.value) == (
+            "place and route has not ended after 0.0 minutes: try another seed "
+            f"(log: {log.relative_to(ROOT)})"
+        )
+
+
+def test_the_log_of_a_tool_that_fails_is_named_with_its_error():
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
+        log = Path(name) / "synthesis.log"
+        words = "import sys; print('ERROR: no way'); sys.stderr.write('bye'); sys.exit(1)"
+        with pytest.raises(SynthesisError) as why:
+            synthesis.run([sys.executable, "-c", words], "synthesis", log)
+        assert str(why.value).startswith("synthesis failed: ERROR: no way (log: build/")
+
+
+# Clocks and sizes
+
+
+def test_the_pll_makes_the_clock_of_the_node_exactly():
+    ecp5 = clocks.pll("ecp5", 25_000_000, 50_000_000, "")
+    assert ecp5.settings == {"CLKI_DIV": 1, "CLKFB_DIV": 2, "CLKOP_DIV": 12}  # 600 MHz
+    ice40 = clocks.pll("ice40", 12_000_000, 18_000_000, "")
+    assert ice40.settings == {"DIVR": 0, "DIVF": 47, "DIVQ": 5, "FILTER_RANGE": 1}  # 576 MHz
+    assert clocks.pll("ecp5", 25_000_000, 25_000_000, "") is None
+
+
+def test_the_costs_of_features_are_those_that_the_page_lists():
+    """docs/features.md has the measured values; where it gives a range, the estimate has its low
+    end.
+    """
+    page = (ROOT / "docs" / "features.md").read_text()
+    rows = dict(
+        re.findall(r"^\| ([\w ,./:-]+?)(?: of 255 segments)? \| (\d+)(?: to \d+)? \|$", page, re.M)
+    )
+    words = {"segments": "segment table", "monitor": "signal monitor", "fine_stage": "fine stage"}
+    words |= {"capture": "capture queue", "encoder_check": "check of the encoder"}
+    for name, lut in size.FEATURES.items():
+        assert int(rows[words.get(name, name)]) == lut, name
+    assert int(rows["step generator"]) == size.STEPPER
+    assert str(size.STEP_NODE) in rows.values() and str(size.SINE_NODE) in rows.values()
+    assert str(size.STEP_AXIS) in rows.values() and str(size.SINE_AXIS) in rows.values()
+
+
+def test_the_block_rams_are_those_of_netlists(tmp_path):
+    """Of nodes that were synthesised for an ECP5: 48 + 8 of the S0 node without its segment table,
+    32 + 10 of eight axes.
+    """
+    assert size.estimate("ecp5", machine.named("s0")).block_ram == 56 + 1
+    assert size.estimate("ecp5", machine.named("eight_axes")).block_ram == 42
+    assert size.estimate("ecp5", machine.named("mill")).block_ram == 38
+    assert TOO_LARGE == [
+        "constraints/machines/s0.toml: 1 axis with 96 KiB need about 57 block RAM, but "
+        "LFE5U-25F-6BG381C of constraints/ulx3s_25f/board.toml has 56"
+    ]
+
+
+# Pins of others
+
+
+def pins_of(platform, number):
+    """{pin: ball} of a connector of Amaranth's."""
+    found = next(each for each in platform.connectors if each.number == number)
+    return dict(found.mapping)
+
+
+def resource(platform, name, number=0):
+    """The balls of a resource of Amaranth's that has one set of pins."""
+    found = next(r for r in platform.resources if (r.name, r.number) == (name, number))
+    return found.ios[0].names
+
+
+def signal(platform, name, part):
+    """The ball of one signal of a resource of Amaranth's."""
+    found = next(r for r in platform.resources if (r.name, r.number) == (name, 0))
+    return next(io.ios[0].names[0] for io in found.ios if io.name == part)
+
+
+@pytest.mark.parametrize(
+    "name, platform", [("ulx3s_25f", ULX3S_25F_Platform), ("ulx3s_85f", ULX3S_85F_Platform)]
+)
+def test_the_pins_of_the_ulx3s_are_those_of_amaranth(name, platform):
+    ours, theirs = board.named(name), pins_of(platform, 0)
+    found = {}
+    for pins in ours.connectors.values():
+        for pin, pad in pins.items():
+            found[pin[2:] + {"gp": "+", "gn": "-"}[pin[:2]]] = pad.ball
+    assert found == theirs
+    assert [ours.clock.ball] == resource(platform, "clk25")
+    assert ours.on_board["usb_rx"].ball == signal(platform, "uart", "rx")
+    assert ours.on_board["usb_tx"].ball == signal(platform, "uart", "tx")
+    switches = [resource(platform, "switch", n)[0] for n in range(4)]
+    assert [pad.ball for pad in ours.address] == switches
+    leds = {resource(platform, "led", n)[0] for n in range(8)}
+    assert {pad.ball for pad in ours.leds.values()} == leds
+    assert platform.device in ours.part.name and platform.package in ours.part.name
+
+
+def test_the_pins_of_the_icebreaker_are_those_of_amaranth():
+    ours, platform = board.named("icebreaker"), ICEBreakerPlatform
+    for number, name in enumerate(("PMOD1A", "PMOD1B", "PMOD2")):
+        theirs = pins_of(platform, number)
+        assert {pin: pad.ball for pin, pad in ours.connectors[name].items()} == theirs
+    assert [ours.clock.ball] == resource(platform, "clk12")
+    assert ours.on_board["usb_rx"].ball == signal(platform, "uart", "rx")
+    assert ours.on_board["usb_tx"].ball == signal(platform, "uart", "tx")
+    flash = {"cs_n": "cs", "sclk": "clk", "mosi": "copi", "miso": "cipo"}
+    for mine, part in flash.items():
+        assert ours.on_board[f"flash_{mine}"].ball == signal(platform, "spi_flash_1x", part)
+    leds = {ours.leds["sending"].ball: "led_r", ours.leds["running"].ball: "led_g"}
+    for ball, name in leds.items():
+        assert [ball] == resource(platform, name)
+
+
+def test_the_package_of_the_up5k_has_39_pins():
+    assert len(board.package_pins("ice40", "up5k", "sg48")) == 39  # of its data sheet
+
+
+# Bad input: board files
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        (
+            'gp3 = "B9"',
+            'gp3 = "Z9"',
+            "J1 gp3: the package CABGA381 of LFE5U-85F-6BG381C has no pin Z9",
+        ),
+        (
+            'pin = "G2"',
+            'pin = "A1"',
+            "clock: the package CABGA381 of LFE5U-85F-6BG381C has no pin A1",
+        ),
+        ('package = "CABGA381"', 'package = "SG48"', "[part] a ecp5 85k has no package SG48"),
+        ('family = "ecp5"', 'family = "ecp6"', "[part] family 'ecp6' is none of ecp5, ice40"),
+        ("hz = 25_000_000", 'hz = "25 MHz"', "[clock] hz must be a whole number"),
+        ('usb_tx = "L4"', 'usb_ty = "L4"', "[on_board] usb_ty is none of usb_rx, usb_tx, "),
+        ('"D7", "E7"]', '"D7"]', "[address] an address has 4 switches"),
+        ('running = "H3"', 'runing = "H3"', "[leds] runing is none of running, sending, "),
+        ("speed = 6", "speed = 6\nsped = 7", "[part] there is no key sped"),
+        ('layout = "ulx3s"', "layout = ", "Invalid value"),
+        ('title = "ULX3S', 'name = "ULX3S', "title is missing"),
+    ],
+)
+def test_a_wrong_board_file_is_refused_with_its_name(old, new, words, tmp_path):
+    path = edited(tmp_path, ULX3S, (old, new))
+    found = refusal(lambda: board.load(path))
+    assert found.startswith(f"{path}: ") and words in found
+
+
+def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
+    path = edited(
+        tmp_path,
+        "constraints/icebreaker/board.toml",
+        ("node_hz = 18_000_000", "node_hz = 20_000_000"),
+    )
+    found = refusal(lambda: fit(board.load(path), machine.named("counter_box")))
+    assert found == (
+        f"{path}: [clock] the PLL makes no 20000000 Hz of 12000000 Hz; the nearest is 19875000 Hz"
+    )
+
+
+# Bad input: machine files
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        (  # a pin used twice
+            'X.encoder_b = "J1 gn0"',
+            'X.encoder_b = "J1 gp0"',
+            "X.encoder_a and X.encoder_b both use J1 gp0",
+        ),
+        (
+            'X.step = "J1 gn3"',
+            'X.step = "J1 gp77"',
+            f"X.step: the connector J1 of {ULX3S} has no pin gp77",
+        ),
+        (
+            'X.step = "J1 gn3"',
+            'X.step = "J9 gp1"',
+            f"X.step: {ULX3S} has no connector J9; there are: J1, J2",
+        ),
+        (
+            'X.step = "J1 gn3"',
+            'X.step = "J1"',
+            "X.step: a pin is written \"CONNECTOR PIN\", not 'J1'",
+        ),
+        (
+            'X.step = "J1 gn3"\n',
+            "",
+            "X.step has no pin; if it is not connected, list it in `unused`",
+        ),
+        ('X.step = "J1 gn3"', 'X.stepp = "J1 gn3"', "X.stepp is no signal of this machine"),
+        (  # a 5 V signal on a 3.3 V pin
+            'part = "RS-422 receiver, AM26LV32 at 3.3 V"\nvolts = 3.3',
+            'part = "RS-422 receiver, AM26LS32"\nvolts = 5.0',
+            f"X.encoder_a comes with 5 V, but J1 gp0 of {ULX3S} takes 3.3 V at most",
+        ),
+        (
+            '[between.rs485]\npart = "RS-485 transceiver, MAX3485"\nvolts = 3.3',
+            '[between.rs485]\npart = "MAX485"\nvolts = [5.0]',
+            f"rs485_rx comes with 5 V, but J2 gp21 of {ULX3S} takes 3.3 V at most",
+        ),
+        (
+            'image = "steps"',
+            'image = "counter"',
+            "the image counter has no drives, but axis X has",
+        ),
+        ('image = "steps"', 'image = "stepps"', "[node] image 'stepps' is none of axis, counter, "),
+        (
+            "memory_kib = 64",
+            "memory_kib = 2048",
+            "3 axes with 2048 KiB need about 1030 block RAM, ",
+        ),
+        ("address = 1", "address = 0", "[node] address 0 must be 1 to 15"),
+        ("address = 1", "address = 1\nsegments = 255", "[node] segments = 255, but no axis has"),
+        ('name = "Y"', 'name = "X"', "two axes have the name X"),
+        ('name = "Y"', 'name = "Y axis"', "[axis 2] name 'Y axis' must consist of letters"),
+        (
+            'name = "Y"',
+            'name = "Y"\nfeatures = ["monitor"]',
+            "the feature monitor of axis Y needs sine",
+        ),
+        (
+            'name = "Y"',
+            'name = "Y"\nfeatures = ["lasers"]',
+            "[axis 2] features: 'lasers' is none of sine, ",
+        ),
+        ("[between.estop]", "[between.stop]", "[between] stop is none of adc, bridge, "),
+        ("[between.rs485]", "[between.adc]", "rs485_rx needs [between.rs485]: part and volts"),
+    ],
+)
+def test_a_wrong_machine_file_is_refused_with_its_name(old, new, words, tmp_path):
+    path = edited(tmp_path, MILL, (old, new))
+    found = refusal(lambda: fit(board.named("ulx3s_85f"), machine.load(path)))
+    assert found.startswith(f"{path}: ") and words in found
+
+
+V8 = "constraints/colorlight_5a_75b_v8_0/board.toml"
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        (  # an output on an input-only buffer
+            'Z.step = "J2 G0"',
+            'Z.step = "J8 B1"',
+            f"Z.step is an output, but J8 B1 of {V8} is an input only behind its buffer (74HC245T",
+        ),
+        (  # an input on an output-only buffer
+            'turned = ["J5", "J6", "J7", "J8"]',
+            'turned = ["J6", "J7", "J8"]',
+            f"X.encoder_a is an input, but J5 R0 of {V8} is an output only behind its buffer (74HC",
+        ),
+        (  # one net on two connectors
+            'Z.step = "J2 G0"\nZ.direction = "J2 B0"',
+            'Z.step = "J1 CLK"\nZ.direction = "J2 CLK"',
+            f"Z.step and Z.direction both use J2 CLK (the same net as J1 CLK of {V8})",
+        ),
+        (
+            'turned = ["J5", "J6", "J7", "J8"]',
+            'turned = ["J5", "J6", "J7", "J9"]',
+            f"turned: {V8} has no buffers at a connector J9",
+        ),
+        (  # 5 V into a part for 3.3 V
+            'between.stepper]\npart = "stepper driver with inputs for 5 V"\nvolts = 5.0',
+            'between.stepper]\npart = "stepper driver with inputs for 3.3 V"\nvolts = 3.3',
+            f"X.step needs 3.3 V, but J1 G0 of {V8} gives 5 V",
+        ),
+        (
+            "address = 1\n",
+            'address = 1\nunused = ["rs485_rx"]\n',
+            "rs485_rx is no signal of this machine, or it is in `unused`",
+        ),
+    ],
+)
+def test_what_the_buffers_of_the_5a_75b_do_not_allow_is_refused(old, new, words, tmp_path):
+    path = edited(tmp_path, MILL, (old, new))
+    found = refusal(lambda: fit(board.named("colorlight_5a_75b_v8_0"), machine.load(path)))
+    assert found.startswith(f"{path}: ") and words in found
+
+
+def test_a_node_without_any_bus_is_refused(tmp_path):
+    text = (
+        (ROOT / MILL).read_text().replace("address = 1\n", 'address = 1\nunused = ["rs485_rx"]\n')
+    )
+    path = tmp_path / "mill.toml"
+    path.write_text(re.sub(r"^rs485_rx = .*\n", "", text, flags=re.M))
+    found = refusal(lambda: fit(board.named("colorlight_5a_75b_v8_0"), machine.load(path)))
+    assert found == f"{path}: {V8} has no USB serial port: connect rs485_rx"
+
+
+def test_more_axes_than_a_node_has_are_refused(tmp_path):
+    path = edited(
+        tmp_path,
+        "constraints/machines/eight_axes.toml",
+        ("[between.encoder]", '[[axis]]\nname = "W"\ndrives = ["stepper"]\n\n[between.encoder]'),
+    )
+    assert refusal(lambda: machine.load(path)) == f"{path}: 9 axes; a node has 1 to 8"
+
+
+def test_more_axes_than_the_part_holds_are_refused(tmp_path):
+    more = '[[axis]]\nname = "E"\nfeatures = ["capture"]\n'
+    more += 'unused = ["encoder_z", "probe_0", "probe_1"]\n\n'
+    path = edited(
+        tmp_path,
+        "constraints/machines/counter_box.toml",
+        ("[between.encoder]", more + "[between.encoder]"),
+        ('D.probe_0 = "PMOD2 3"', 'E.encoder_a = "PMOD2 3"'),
+        ('D.probe_1 = "PMOD2 4"', 'E.encoder_b = "PMOD2 4"'),
+        ('name = "D"\n', 'name = "D"\nunused = ["probe_0", "probe_1"]\n'),
+    )
+    found = refusal(lambda: fit(board.named("icebreaker"), machine.load(path)))
+    assert found == (
+        f"{path}: 5 axes with 64 KiB need about 35 block RAM, but iCE40UP5K-SG48 of "
+        "constraints/icebreaker/board.toml has 30"
+    )
+
+
+def test_a_pin_that_the_board_uses_itself_is_refused(tmp_path):
+    """Pin 1 of P5A is the serial port of the extension board."""
+    path = edited(tmp_path, MILL, ('X.encoder_a = "P2A 1"', 'X.encoder_a = "P5A 1"'))
+    found = refusal(lambda: fit(board.named("colorlight_i5"), machine.load(path)))
+    i5 = "constraints/colorlight_i5/board.toml"
+    assert found == (
+        f"{path}: usb_tx and X.encoder_a both use P5A 1 (the same net as usb_tx of {i5})"
+    )
+
+
+def test_a_machine_that_is_not_wired_for_a_board_is_refused():
+    found = refusal(lambda: fit(board.named("icebreaker"), machine.named("s0")))
+    assert found == (
+        "constraints/machines/s0.toml: has no [wiring.icebreaker] for the board icebreaker; it is "
+        "wired for ulx3s"
+    )
+
+
+def test_unknown_names_list_the_known_ones(tmp_path):
+    assert "there is no board 'arty'; there are: colorlight_5a" in refusal(
+        lambda: board.named("arty")
+    )
+    assert "there is no machine 'lathe'; there are: c" in refusal(lambda: machine.named("lathe"))
+    missing = tmp_path / "lathe.toml"
+    assert refusal(lambda: machine.named(str(missing))) == f"{missing}: no such file or directory"
+
+
+def test_the_command_refuses_before_any_tool_runs(tmp_path):
+    path = edited(tmp_path, MILL, ('X.encoder_b = "J1 gn0"', 'X.encoder_b = "J1 gp0"'))
+    command = [sys.executable, "-m", "boards.build", "--board", "ulx3s_85f", "--machine", str(path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (1, "")
+    words = f"board: {path}: X.encoder_a and X.encoder_b both use J1 gp0\n"
+    assert done.stderr == words

@@ -15,7 +15,7 @@ from twin import Axis, Node, Twin, TwinTransport, build
 AXES = 4
 CLK_HZ = 20_000_000
 BAUD = 115_200
-NODE = {  # as in sw/figures/counter_box_bench.sv
+NODE = {  # as constraints/machines/counter_box.toml builds it
     "FILTERS": 0,
     "HAS_SINE": 0,
     "HAS_COMPARE": 0,

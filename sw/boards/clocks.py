@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of the PLL between the oscillator of a board and the clock of its node."""
+
+from dataclasses import dataclass
+
+from boards.toml_file import Misfit
+
+# ECP5 (FPGA-DS-02012) and iCE40 UltraPlus (FPGA-DS-02008): Hz of the oscillator of the PLL
+ECP5_VCO = 400_000_000, 800_000_000
+ICE40_VCO = 533_000_000, 1_066_000_000
+ECP5_MOST = 128  # largest divider
+ECP5_TARGET = 600_000_000  # the middle of the range
+ICE40_FILTER = ((17, 1), (26, 2), (44, 3), (66, 4), (101, 5), (134, 6))  # MHz below, setting
+
+
+@dataclass(frozen=True)
+class Pll:
+    """Dividers by the names of the primitive's parameters."""
+
+    settings: dict[str, int]
+    output_hz: float
+
+
+def ecp5(input_hz: int, output_hz: int) -> list[Pll]:
+    """What an EHXPLLL with its output as feedback can make, the best first."""
+    found = []
+    for divide in range(1, 9):
+        feedback, left = divmod(output_hz * divide, input_hz)
+        if left or not 1 <= feedback <= ECP5_MOST:
+            continue
+        for output in range(1, ECP5_MOST + 1):
+            vco = output_hz * output
+            if ECP5_VCO[0] <= vco <= ECP5_VCO[1]:
+                settings = {"CLKI_DIV": divide, "CLKFB_DIV": feedback, "CLKOP_DIV": output}
+                found.append((divide, abs(vco - ECP5_TARGET), Pll(settings, output_hz)))
+    return [pll for *_, pll in sorted(found, key=lambda each: each[:2])]
+
+
+def ice40(input_hz: int, output_hz: int) -> list[Pll]:
+    """What an SB_PLL40_PAD with simple feedback can make nearest to a clock, the best first."""
+    found = []
+    for divide in range(16):
+        detector = input_hz / (divide + 1)
+        setting = next((n for below, n in ICE40_FILTER if detector < below * 1e6), 0)
+        if detector < 10e6 or not setting:
+            continue
+        for shift in range(1, 7):
+            for feedback in range(128):
+                vco = detector * (feedback + 1)
+                if ICE40_VCO[0] <= vco <= ICE40_VCO[1]:
+                    settings = {"DIVR": divide, "DIVF": feedback, "DIVQ": shift}
+                    made = vco / 2**shift
+                    settings["FILTER_RANGE"] = setting
+                    found.append((abs(made - output_hz), divide, Pll(settings, made)))
+    return [pll for *_, pll in sorted(found, key=lambda each: each[:2])]
+
+
+def pll(family: str, input_hz: int, output_hz: int, file: str) -> Pll | None:
+    """The PLL of a board; None if the node runs at the clock of the board. It is exact, since the
+    node derives all its times from its clock.
+    """
+    if input_hz == output_hz:
+        return None
+    best = (ecp5 if family == "ecp5" else ice40)(input_hz, output_hz)
+    if not best or best[0].output_hz != output_hz:
+        nearest = f"; the nearest is {best[0].output_hz:.0f} Hz" if best else ""
+        raise Misfit(f"{file}: [clock] the PLL makes no {output_hz} Hz of {input_hz} Hz{nearest}")
+    return best[0]

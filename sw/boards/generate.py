@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is made of a machine on a board: its top, its constraints, its wiring page and drawing."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from boards.board import Pad
+from boards.fit import Connection, Design
+from boards.machine import AXIS_SIGNALS
+
+TEMPLATES = Environment(
+    loader=FileSystemLoader(Path(__file__).with_name("templates")),
+    undefined=StrictUndefined,
+    autoescape=lambda name: bool(name and (".html" in name or ".svg" in name)),
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+)
+CONSTRAINTS = {"ecp5": "pins.lpf", "ice40": "pins.pcf"}
+BITSTREAM = "moire.bit"
+NODE_OUTPUTS = (  # besides those of the axes
+    *("rs485_tx", "rs485_driver_enable", "flash_cs_n", "flash_sclk", "flash_mosi"),
+    *("i2c_scl_low", "i2c_sda_low", "keyboard_clock_low", "keyboard_data_low", "edm_clock_low"),
+    *("edm_data_low", "peer_tx", "display_cs_n", "display_sclk", "display_data"),
+)
+PERIPHERAL_INPUTS = {  # at the levels at which nothing happens
+    **dict.fromkeys(("i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data"), "1'b1"),
+    **dict.fromkeys(("edm_clock", "edm_data", "peer_rx", "sensor_rx"), "1'b1"),
+    "edm_status": "2'b00",
+}
+ROW, HEAD, PARTS_LEFT, LETTER = 26, 30, 420, 8  # of the drawing, in its units
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A port of the top at its pin."""
+
+    port: str
+    direction: str
+    pad: Pad
+    comment: str
+
+    @property
+    def declared(self) -> str:
+        return f"{'input  wire ' if self.direction == 'in' else 'output logic'} {self.port}"
+
+
+def has_flash(design: Design) -> bool:
+    """Whether the firmware comes out of the flash."""
+    return design.machine.core == "serial"
+
+
+def has_usb(design: Design) -> bool:
+    return {"usb_rx", "usb_tx"} <= set(design.board.on_board)
+
+
+def pins(design: Design) -> list[Pin]:
+    """All pins of the top."""
+    board = design.board
+    found = [Pin("clock", "in", board.clock, f"{board.clock_hz / 1e6} MHz")]
+    for name, pad in board.on_board.items():
+        if has_flash(design) or not name.startswith("flash"):
+            timing = ", synchronous to flash_sclk" if name == "flash_miso" else ""
+            found.append(Pin(name, pad.direction, pad, f"pin {pad.ball}{timing}"))
+    found += [
+        Pin(f"address_{n}", "in", pad, f"static: switch, bit {n} of the address on the bus")
+        for n, pad in enumerate(board.address)
+    ]
+    found += [
+        Pin(f"led_{name}", "out", pad, f"{'0' if board.leds_low else '1'}: on")
+        for name, pad in board.leds.items()
+    ]
+    found += [
+        Pin(one.port, one.signal.direction, one.pad, f"{one.pad.place}: {one.signal.meaning}")
+        for one in design.connections
+    ]
+    return found
+
+
+def outputs(design: Design) -> dict[str, int]:
+    """{output of the node: its bits}"""
+    axes = len(design.machine.axes)
+    found = {name: axes for name, signal in AXIS_SIGNALS.items() if signal.direction == "out"}
+    return found | dict.fromkeys(NODE_OUTPUTS, 1)
+
+
+def inputs(design: Design) -> dict[str, str]:
+    """{input of the node: what it is connected to}"""
+    ports = {one.name: one.port for one in design.connections}
+
+    def bits(*names: str) -> str:
+        """An input with these bits of each axis, the highest first."""
+        each = [
+            ports.get(f"{axis.name}.{name}", f"1'b{AXIS_SIGNALS[name].idle}")
+            for axis in reversed(design.machine.axes)
+            for name in names
+        ]
+        return "{" + ", ".join(each) + "}"
+
+    switches = [f"address_{n}" for n in reversed(range(len(design.board.address)))]
+    heard = ["usb_rx"] * has_usb(design) + ["rs485_rx"] * ("rs485_rx" in ports)
+    return {
+        "address": f"{{{', '.join(switches)}}}" if switches else f"4'd{design.machine.address}",
+        "rs485_rx": " & ".join(heard),
+        "estop_open": ports.get("estop_open", "1'b0"),
+        **{
+            name: bits(name)
+            for name, signal in AXIS_SIGNALS.items()
+            if signal.direction == "in" and not name.startswith("probe")
+        },
+        "probe": bits("probe_1", "probe_0"),
+        "flash_miso": "flash_miso" if has_flash(design) else "1'b0",
+        **PERIPHERAL_INPUTS,
+    }
+
+
+def shown(design: Design) -> dict[str, str]:
+    """{what a LED may show: the expression}"""
+    given = inputs(design)
+    return {
+        "running": "locked && !rst",
+        "sending": "node_rs485_driver_enable",
+        "estop": given["estop_open"],
+        "limit_high": f"|{given['limit_high_open']}",
+        "limit_low": f"|{given['limit_low_open']}",
+        "drive_fault": f"!(&{given['drive_fault_n']})",
+        "step": "|node_step",
+        "drive_on": "|node_drive_enable",
+    }
+
+
+def assigned(design: Design) -> dict[str, str]:
+    """{port that the top drives: the expression}"""
+    board = design.board
+    on = "!" if board.leds_low else ""
+    found = {f"led_{name}": f"{on}({shown(design)[name]})" for name in board.leds}
+    if has_usb(design):
+        found["usb_tx"] = "node_rs485_tx"
+    if has_flash(design):
+        found |= {name: f"node_{name}" for name in NODE_OUTPUTS if name.startswith("flash")}
+    number = {axis.name: n for n, axis in enumerate(design.machine.axes)}
+    for one in design.connections:
+        if one.signal.direction == "out":
+            axis, _, name = one.name.rpartition(".")
+            index = f"[{number[axis]}]" if axis and len(number) > 1 else ""
+            found[one.port] = f"node_{name}{index}"
+    return found
+
+
+def literal(value: int | str) -> str:
+    """A value as a parameter of SystemVerilog."""
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def level(one: Connection) -> float:
+    """Volts at a pin while it is high."""
+    return max(one.between.volts) if one.signal.direction == "in" else one.pad.volts
+
+
+def boxes(design: Design) -> list[dict[str, Any]]:
+    """The connectors of the drawing with their rows, from top to bottom; only pins in use."""
+    found: list[dict[str, Any]] = []
+    top = 40
+    for name, its_pins in design.board.connectors.items():
+        used = {one.pad.place: one for one in design.connections}
+        rows: list[dict[str, Any]] = []
+        for pin in its_pins:
+            one = used.get(f"{name} {pin}")
+            if one is None:
+                continue
+            y = top + HEAD + ROW * len(rows) + 8
+            left, right = (150, 141) if one.signal.direction == "in" else (411, 420)
+            rows.append(
+                {
+                    "pin": pin,
+                    "ball": one.pad.ball,
+                    "signal": one.name,
+                    "direction": one.signal.direction,
+                    "volts": level(one),
+                    "part": one.between.part,
+                    "y": y,
+                    "arrow": f"M{right} {y} L{left} {y - 5} L{left} {y + 5} Z",
+                }
+            )
+        if rows:
+            height = HEAD + ROW * len(rows)
+            found.append({"name": name, "top": top, "height": height, "rows": rows})
+            top += height + 16
+    return found
+
+
+def svg(design: Design) -> str:
+    """The drawing: connector, pin, signal, level, and what is between."""
+    drawn = boxes(design)
+    height = drawn[-1]["top"] + drawn[-1]["height"] + 10 if drawn else 60
+    longest = max((len(one.between.part) for one in design.connections), default=0)
+    return TEMPLATES.get_template("wiring.svg.jinja").render(
+        d=design,
+        boxes=drawn,
+        width=PARTS_LEFT + 20 + LETTER * longest,
+        height=height,
+        parts_left=PARTS_LEFT,
+    )
+
+
+def unconnected(design: Design) -> list[str]:
+    """Signals of the machine that are listed as not connected."""
+    machine = design.machine
+    of_axes = [f"{axis.name}.{name}" for axis in machine.axes for name in axis.unused]
+    return [*machine.unused, *of_axes]
+
+
+def page(design: Design) -> str:
+    """The wiring page."""
+    return TEMPLATES.get_template("wiring.html.jinja").render(
+        d=design,
+        svg=Markup(svg(design)),
+        connections=design.connections,
+        unconnected=unconnected(design),
+        level=level,
+        bitstream=BITSTREAM,
+    )
+
+
+def top(design: Design) -> str:
+    """The top as SystemVerilog."""
+    return TEMPLATES.get_template("top.sv.jinja").render(
+        d=design,
+        ports=pins(design),
+        outputs=outputs(design),
+        inputs=inputs(design),
+        assigned=assigned(design),
+        literal=literal,
+    )
+
+
+def files(design: Design) -> dict[str, str]:
+    """{name: text} of all that is made before any tool runs."""
+    constraints = CONSTRAINTS[design.board.part.family]
+    return {
+        "top.sv": top(design),
+        constraints: TEMPLATES.get_template(f"{constraints}.jinja").render(
+            d=design, pins=pins(design)
+        ),
+        "wiring.svg": svg(design),
+        "wiring.html": page(design),
+    }

@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A machine: what a machine file (constraints/machines/NAME.toml) says of its axes, of what is
+between them and the board, and of the pins that they are on.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from boards.toml_file import ROOT, Misfit, Table, read
+from firmware.build import IMAGES
+
+FOLDER = ROOT / "constraints" / "machines"
+MOST_AXES = 8  # of a node
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A signal of an axis or of the node at a pin."""
+
+    direction: str  # in or out, of the FPGA
+    group: str  # signals of one group go through the same part, [between.GROUP]
+    meaning: str
+    idle: int = 0  # level of an input that is not connected
+    needs: str = ""  # drive or feature of the axis; empty: every axis has it
+
+
+DRIVES = {"bridge": "HAS_BRIDGE", "stepper": "HAS_STEPPER", "dac": "HAS_DAC"}
+FEATURES = {  # of an axis: its parameter of rtl/node.sv, and the feature that it needs
+    "sine": ("HAS_SINE", ""),
+    "own_chain": ("HAS_OWN_CHAIN", "sine"),
+    "monitor": ("HAS_MONITOR", "sine"),
+    "harmonics": ("HAS_HARMONICS", "sine"),
+    "recorder": ("HAS_RECORDER", "sine"),
+    "segments": ("HAS_SEGMENTS", ""),
+    "capture": ("HAS_CAPTURE", ""),
+    "compare": ("HAS_COMPARE", ""),
+    "encoder_check": ("HAS_ENCODER_CHECK", ""),
+    "velocity": ("HAS_VELOCITY", ""),
+    "filters": ("HAS_FILTERS", "drive"),
+    "fine_stage": ("HAS_FINE_STAGE", "dac"),
+}
+AXIS_SIGNALS = {
+    "encoder_a": Signal("in", "encoder", "A of the scale"),
+    "encoder_b": Signal("in", "encoder", "B of the scale"),
+    "encoder_z": Signal("in", "encoder", "index of the scale"),
+    "probe_0": Signal("in", "probe", "touch probe 0"),
+    "probe_1": Signal("in", "probe", "touch probe 1"),
+    "adc_sin": Signal("in", "adc", "sine, synchronous to adc_sclk", needs="sine"),
+    "adc_cos": Signal("in", "adc", "cosine, synchronous to adc_sclk", needs="sine"),
+    "adc_cs_n": Signal("out", "adc", "low during a conversion", needs="sine"),
+    "adc_sclk": Signal("out", "adc", "clock of the ADC, idles high", needs="sine"),
+    "compare_pulse": Signal("out", "compare", "high during a compare pulse", needs="compare"),
+    "limit_low_open": Signal("in", "limit", "1: pressed or wire cut", needs="drive"),
+    "limit_high_open": Signal("in", "limit", "1: pressed or wire cut", needs="drive"),
+    "drive_fault_n": Signal("in", "drive_fault", "0: fault of the drive", 1, "drive"),
+    "drive_enable": Signal("out", "drive_enable", "1: the drive may be on", needs="drive"),
+    "bridge_a": Signal("out", "bridge", "alone high for a positive command", needs="bridge"),
+    "bridge_b": Signal("out", "bridge", "alone high for a negative command", needs="bridge"),
+    "step": Signal("out", "stepper", "step", needs="stepper"),
+    "direction": Signal("out", "stepper", "direction", needs="stepper"),
+    "dac_cs_n": Signal("out", "dac", "low during a word", needs="dac"),
+    "dac_sclk": Signal("out", "dac", "clock of the DAC, idles low", needs="dac"),
+    "dac_sdi": Signal("out", "dac", "data of the DAC", needs="dac"),
+}
+NODE_SIGNALS = {
+    "rs485_rx": Signal("in", "rs485", "receiver of the bus, idles high", 1),
+    "rs485_tx": Signal("out", "rs485", "driver of the bus, idles high"),
+    "rs485_driver_enable": Signal("out", "rs485", "1: drive the bus"),
+    "estop_open": Signal("in", "estop", "1: emergency stop pressed or wire cut", needs="drive"),
+}
+GROUPS = sorted({signal.group for signal in (AXIS_SIGNALS | NODE_SIGNALS).values()})
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: what it is built with and which of its signals are not connected."""
+
+    name: str
+    drives: list[str]
+    features: list[str]
+    unused: list[str]
+
+    def has(self, name: str) -> bool:
+        """Whether it has a drive or a feature; `drive` is any drive, the empty name everything."""
+        if name == "drive":
+            return bool(self.drives)
+        if name == "velocity" and self.drives:
+            return True
+        return name in ("", *self.drives, *self.features)
+
+    def signals(self) -> Iterator[str]:
+        """The names of the signals that it has, connected or not."""
+        return (name for name, signal in AXIS_SIGNALS.items() if self.has(signal.needs))
+
+
+@dataclass(frozen=True)
+class Between:
+    """What is between the pins of a group of signals and the machine."""
+
+    part: str
+    volts: list[float]  # levels on the side of the board: given to inputs, taken from outputs
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """The pins of a machine on the boards of one layout."""
+
+    pins: dict[str, str]  # {signal, `X.step` or `rs485_rx`: `CONNECTOR PIN`}
+    turned: list[str]  # connectors whose buffers were turned into inputs
+    between: dict[str, Between]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine file that has been checked by itself."""
+
+    name: str
+    file: str
+    title: str
+    image: str
+    core: str
+    memory_kib: int
+    address: int  # on the bus, where the board has no switches
+    filters: int
+    segments: int
+    axes: list[Axis]
+    unused: list[str]  # signals of the node that are not connected
+    wiring: dict[str, Wiring]  # by layout
+
+    def signals(self) -> dict[str, Signal]:
+        """{name: signal} of all its signals that are to be connected."""
+        drives = any(axis.drives for axis in self.axes)
+        found = {
+            name: signal
+            for name, signal in NODE_SIGNALS.items()
+            if name not in self.unused and (drives or not signal.needs)
+        }
+        for axis in self.axes:
+            found |= {
+                f"{axis.name}.{name}": AXIS_SIGNALS[name]
+                for name in axis.signals()
+                if name not in axis.unused
+            }
+        return found
+
+
+def axis_of(table: Table) -> Axis:
+    axis = Axis(
+        table.take("name", str),
+        table.chosen("drives", DRIVES),
+        table.chosen("features", FEATURES),
+        table.chosen("unused", AXIS_SIGNALS),
+    )
+    table.close()
+    if not axis.name.isidentifier():
+        raise table.misfit(f"name {axis.name!r} must consist of letters, digits and _")
+    for name in axis.features:
+        needed = FEATURES[name][1]
+        if not axis.has(needed):
+            raise table.misfit(f"the feature {name} of axis {axis.name} needs {needed}")
+    for name in axis.unused:
+        if name not in axis.signals():
+            raise table.misfit(f"unused: axis {axis.name} has no {name} anyway")
+    return axis
+
+
+def between_of(table: Table) -> dict[str, Between]:
+    found = {}
+    for group in list(table.left):
+        if group not in GROUPS:
+            raise table.misfit(f"{group} is none of {', '.join(GROUPS)}")
+        row = table.table(group)
+        levels = row.left.pop("volts", None)
+        volts = levels if isinstance(levels, list) else [levels]
+        if not volts or not all(isinstance(v, (int, float)) for v in volts):
+            raise row.misfit("volts must be a number or a list of numbers")
+        found[group] = Between(row.take("part", str), [float(v) for v in volts])
+        row.close()
+    return found
+
+
+def wiring_of(table: Table, between: dict[str, Between]) -> Wiring:
+    """The wiring of a layout; its own [between] tables replace those of the machine."""
+    turned, own = table.words("turned"), between_of(table.table("between"))
+    pins: dict[str, str] = {}
+    for key, value in table.left.items():
+        found: dict[str, Any] = (
+            {f"{key}.{name}": pin for name, pin in value.items()}
+            if isinstance(value, dict)
+            else {key: value}
+        )
+        for name, pin in found.items():
+            if not isinstance(pin, str) or len(pin.split()) != 2:
+                raise table.misfit(f'{name}: a pin is written "CONNECTOR PIN", not {pin!r}')
+            pins[name] = " ".join(pin.split())
+    return Wiring(pins, turned, between | own)
+
+
+def check(machine: Machine) -> None:
+    """Refuses what contradicts itself, whatever board it is."""
+    file, names = machine.file, [axis.name for axis in machine.axes]
+    if not 1 <= len(names) <= MOST_AXES:
+        raise Misfit(f"{file}: {len(names)} axes; a node has 1 to {MOST_AXES}")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise Misfit(f"{file}: two axes have the name {twice[0]}")
+    if machine.image not in IMAGES:
+        raise Misfit(f"{file}: [node] image {machine.image!r} is none of {', '.join(IMAGES)}")
+    image = IMAGES[machine.image]
+    if len(names) > image.most_axes:
+        raise Misfit(f"{file}: the image {machine.image} serves {image.most_axes} axes at most")
+    driven = [axis.name for axis in machine.axes if axis.drives]
+    if driven and not image.drives:
+        raise Misfit(f"{file}: the image {machine.image} has no drives, but axis {driven[0]} has")
+    if not 1 <= machine.address <= 15:
+        raise Misfit(f"{file}: [node] address {machine.address} must be 1 to 15")
+    for size, feature in ((machine.segments, "segments"), (machine.filters, "filters")):
+        with_it = [axis.name for axis in machine.axes if feature in axis.features]
+        if bool(size) != bool(with_it):
+            raise Misfit(
+                f"{file}: [node] {feature} = {size}, but "
+                f"{f'axis {with_it[0]} has' if with_it else 'no axis has'} the feature {feature}"
+            )
+
+
+def names() -> list[str]:
+    """All machines of the project."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def load(path: Path) -> Machine:
+    """The machine of a machine file."""
+    table = read(path)
+    node, between = table.table("node", True), between_of(table.table("between"))
+    layouts = table.table("wiring")
+    core = node.take("core", str, "soft")
+    if core not in ("soft", "serial"):
+        raise node.misfit(f"core {core!r} is none of soft, serial")
+    machine = Machine(
+        name=path.stem,
+        file=table.file,
+        title=table.take("title", str),
+        image=node.take("image", str),
+        core=core,
+        memory_kib=node.take("memory_kib", int),
+        address=node.take("address", int),
+        filters=node.take("filters", int, 0),
+        segments=node.take("segments", int, 0),
+        axes=[axis_of(row) for row in table.rows("axis")],
+        unused=node.chosen("unused", NODE_SIGNALS),
+        wiring={layout: wiring_of(layouts.table(layout), between) for layout in list(layouts.left)},
+    )
+    for each in (node, table):
+        each.close()
+    check(machine)
+    return machine
+
+
+def named(name: str) -> Machine:
+    """A machine of the project, or the one of a file if the name is that of a file (.toml)."""
+    if name.endswith(".toml"):
+        return load(Path(name))
+    if name not in names():
+        raise Misfit(
+            f"there is no machine {name!r}; there are: {', '.join(names())}, or name a .toml file"
+        )
+    return load(FOLDER / f"{name}.toml")

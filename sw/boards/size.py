@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How large a node becomes, estimated before any synthesis: an error of some percent is usual."""
+
+from dataclasses import dataclass
+
+from boards.machine import Axis, Machine
+from firmware.build import stem_of
+
+FLASH = ("flash_cs_n", "flash_sclk", "flash_mosi", "flash_miso")
+# LUT4 of an ECP5 as docs/features.md lists them (make figure NAME=axis_step_lut, axis_sine_lut)
+STEP_AXIS, SINE_AXIS = 1147, 1321
+STEP_NODE, SINE_NODE = 8291, 10583  # of two axes each
+FEATURES = {
+    "segments": 1030,
+    "monitor": 750,
+    "compare": 440,
+    "fine_stage": 310,
+    "capture": 280,
+    "encoder_check": 190,
+    "recorder": 100,
+}
+STEPPER = 730  # in an axis that has another drive
+# Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of ten nodes)
+MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
+MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
+SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
+RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
+# On an iCE40 (make figure NAME=node_up5k_lc): the node of four axes that count in logic cells, the
+# LUT4 by which netlists of four and three of them differ, and the queue of an axis' captures
+COUNTING_NODE, COUNTING_AXIS = 4657, 562
+ICE40_BLOCK_RAM, ICE40_CAPTURE = 5, 6
+TICK, TICK_AXIS = 70, 365  # cycles of the motion engine (docs/engine.md)
+TICK_FILTERS = {0: 0, 2: 115, 4: 219}  # further cycles of an axis with so many biquads
+
+
+@dataclass(frozen=True)
+class Size:
+    """What a node takes of a part."""
+
+    lut: int
+    block_ram: int
+
+
+def firmware_stem(machine: Machine) -> str:
+    """The name of the files of the firmware's image."""
+    return stem_of(machine.image, len(machine.axes), machine.core)
+
+
+def axis_lut(axis: Axis) -> int:
+    """LUT4 that a further axis takes on an ECP5."""
+    base = SINE_AXIS if axis.has("sine") else STEP_AXIS
+    more = sum(lut for name, lut in FEATURES.items() if axis.has(name))
+    both = "stepper" in axis.drives and (axis.has("sine") or len(axis.drives) > 1)
+    return base + more + STEPPER * both
+
+
+def ecp5_block_ram(machine: Machine) -> int:
+    """Block RAMs on an ECP5."""
+    axes = machine.axes
+
+    def count(*names: str) -> int:
+        """Axes that have all of these features."""
+        return sum(all(axis.has(name) for name in names) for axis in axes)
+
+    found = MEMORY_STEP * -(-machine.memory_kib // MEMORY_STEP_KIB)
+    found += next(ram for most, ram in SETTINGS if len(axes) <= most)
+    found += RECORDER * count("recorder") + SEGMENT_TABLE * count("segments")
+    own = count("harmonics", "own_chain")
+    found += own + -(-(count("harmonics") - own) // HARMONICS_AXES)
+    if count("velocity"):
+        found += MICROCODE + ENGINE * -(-len(axes) // ENGINE_AXES)
+    return found
+
+
+def estimate(family: str, machine: Machine) -> Size:
+    """The size of a node for this machine."""
+    axes = machine.axes
+    if family == "ice40":
+        lut = COUNTING_NODE + (len(axes) - 4) * COUNTING_AXIS
+        if machine.core == "soft":
+            lut += STEP_NODE - 2 * STEP_AXIS
+        captures = sum(axis.has("capture") for axis in axes)
+        return Size(lut, ICE40_BLOCK_RAM + ICE40_CAPTURE * captures)
+    sine = any(axis.has("sine") for axis in axes)
+    shared = SINE_NODE - 2 * SINE_AXIS if sine else STEP_NODE - 2 * STEP_AXIS
+    return Size(shared + sum(map(axis_lut, axes)), ecp5_block_ram(machine))
+
+
+def tick_cycles(machine: Machine) -> int:
+    """Cycles of the motion engine for a servo tick, at most; 0 without an engine."""
+    if not any(axis.has("velocity") for axis in machine.axes):
+        return 0
+    filters = next((n for size, n in TICK_FILTERS.items() if size >= machine.filters), 0)
+    return TICK + len(machine.axes) * (TICK_AXIS + filters)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes the tables of docs/boards.md from the boards and machines of constraints/."""
+
+import os
+import sys
+from pathlib import Path
+
+from boards import board, machine
+from boards.board import Board
+from boards.build import fitting
+from boards.fit import Design
+from boards.machine import Axis, Machine
+from tables import made_files
+from tables.made_files import ROOT
+
+PAGE = ROOT / "docs" / "boards.md"
+BEGIN = "<!-- Made by tables/boards.py from constraints/: do not edit. -->\n"
+END = "<!-- End of the made tables. -->\n"
+
+
+def table(head: str, rows: list[list[str]]) -> list[str]:
+    """A table of Markdown; the columns of the head are separated by commas."""
+    columns = head.split(", ")
+    lines = [f"| {' | '.join(each)} |" for each in [columns, ["---"] * len(columns), *rows]]
+    return ["", *lines]
+
+
+def link(file: str) -> str:
+    return os.path.relpath(ROOT / file, PAGE.parent)
+
+
+def levels(one: Board) -> str:
+    """The levels of its connectors."""
+    pads = [pad for pins in one.connectors.values() for pad in pins.values()]
+    found = sorted({pad.volts for pad in pads})
+    words = " and ".join(f"{volts:g} V" for volts in found)
+    return f"{words}, outputs until their buffers are replaced" if one.buffer else words
+
+
+def board_row(one: Board) -> list[str]:
+    balls = {pad.ball for pins in one.connectors.values() for pad in pins.values()}
+    own = balls - {pad.ball for pad in one.on_board.values()}
+    on_usb = "its USB serial port and RS-485" if "usb_rx" in one.on_board else "RS-485"
+    return [
+        f"[`{one.name}`]({link(one.file)})",
+        one.title,
+        f"{one.part.name}: {one.part.lut} LUT4, {one.part.block_ram} block RAMs",
+        f"{one.node_hz / 1e6:g} MHz",
+        str(len(own)),
+        levels(one),
+        on_usb,
+    ]
+
+
+def kind(axis: Axis) -> str:
+    """What an axis is, in words."""
+    scale = "sine, cosine and A/B/Z" if axis.has("sine") else "A/B/Z"
+    return f"{scale}, {', '.join(axis.drives) or 'no drive'}"
+
+
+def machine_row(one: Machine) -> list[str]:
+    kinds = sorted({kind(axis) for axis in one.axes})
+    return [
+        f"[`{one.name}`]({link(one.file)})",
+        one.title,
+        f"{len(one.axes)}: {'; '.join(kinds)}",
+        f"`{one.image}`, {one.core} core, {one.memory_kib} KiB",
+    ]
+
+
+def design_row(one: Design) -> list[str]:
+    return [
+        f"`make board BOARD={one.board.name} MACHINE={one.machine.name}`",
+        f"{one.estimate.lut} of {one.board.part.lut}",
+        f"{one.estimate.block_ram} of {one.board.part.block_ram}",
+        str(len(one.connections)),
+    ]
+
+
+def make() -> dict[Path, str]:
+    boards = [board.named(name) for name in board.names()]
+    machines = [machine.named(name) for name in machine.names()]
+    designs, refused = fitting()
+    lines = [
+        *table(
+            "board, what it is, part, clock of the node, pins, levels, bus",
+            [board_row(one) for one in boards],
+        ),
+        *table("machine, what it is, axes, firmware", [machine_row(one) for one in machines]),
+        *table(
+            "command, LUT4 or logic cells by estimate, block RAMs by estimate, signals",
+            [design_row(one) for one in designs],
+        ),
+        *(["", "Wired, but too large:", ""] * bool(refused)),
+        *(f"- {why}" for why in refused),
+        "",
+    ]
+    return {PAGE: made_files.filled(PAGE, BEGIN, END, lines)}
+
+
+if __name__ == "__main__":
+    sys.exit(made_files.main(__doc__ or "", make))
