@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xFD44F463u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xFC589985u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -978,8 +978,11 @@ enum bus_parameter {
     // segment table: 0 off, 1 each segment has the mean of its borders (S0), 2 linear
     // interpolation; it is in force after homing
     BUS_PARAMETER_SEGMENTS = 90,
+    // index: it counts only at these levels of A and B: 0 any, 1 both low, 2 A high, 3 both high, 4
+    // B high; found by `moire index survey`
+    BUS_PARAMETER_INDEX_GATE = 91,
 };
-#define BUS_PARAMETER_COUNT 90u
+#define BUS_PARAMETER_COUNT 91u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define BUS_PARAMETERS(X) \
@@ -1072,7 +1075,8 @@ enum bus_parameter {
     X(segment_count, 87, 1LL, 255LL, 120LL) \
     X(segment_length, 88, 1LL, 70368744177664LL, 81920000LL) \
     X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
-    X(segments, 90, 0LL, 2LL, 0LL)
+    X(segments, 90, 0LL, 2LL, 0LL) \
+    X(index_gate, 91, 0LL, 4LL, 0LL)
 
 // X(parameter, field of axis.built without which it accepts only 0 and its default)
 #define BUS_PARAMETER_NEEDS(X) \
@@ -1174,7 +1178,8 @@ enum bus_parameter {
     X(SOURCE, source) \
     X(STEPS, steps) \
     X(DAC, dac) \
-    X(FILTERS, filters)
+    X(FILTERS, filters) \
+    X(INDEX, index)
 
 #define BUS_PARAMETERS_APPLIED(X) \
     X(VELOCITY, MOTION) \
@@ -1209,7 +1214,8 @@ enum bus_parameter {
     X(FILTER_2_B2, FILTERS) \
     X(FILTER_2_A1, FILTERS) \
     X(FILTER_2_A2, FILTERS) \
-    X(PROFILE, MOTION)
+    X(PROFILE, MOTION) \
+    X(INDEX_GATE, INDEX)
 
 enum bus_setting {
     // [0.01 arcsec] turn: it has ended when the remainder by the sensor is not larger than this
@@ -1275,6 +1281,6 @@ enum bus_setting {
     X(job_speed, 20, 1LL, 100LL, 100LL)
 
 // Of all parameters and settings: it changes with the meaning of a saved number.
-#define BUS_VALUES_CRC 0x522AA65Du
+#define BUS_VALUES_CRC 0x5619F86Du
 
 #endif

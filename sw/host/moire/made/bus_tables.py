@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xFD44F463
+PROTOCOL_CRC = 0xFC589985
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -814,6 +814,10 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               0, 2, 0,
               "segment table: 0 off, 1 each segment has the mean of its borders "
               "(S0), 2 linear interpolation; it is in force after homing", "SEGMENTS"),
+    Parameter("index_gate", 91, "", Fraction(1, 1),
+              0, 4, 0,
+              "index: it counts only at these levels of A and B: 0 any, 1 both low, 2 A high, 3 "
+              "both high, 4 B high; found by `moire index survey`"),
 )}
 
 SETTINGS = {parameter.name: parameter for parameter in (
