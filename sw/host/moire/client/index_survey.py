@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from moire import units
 from moire.client.records import IndexSurvey
 from moire.client.values import CHOICES
-from moire.errors import MoireError, NotSurveyed, OutOfRange
+from moire.errors import MoireError, MotionFailed, NotSurveyed, OutOfRange
 
 if TYPE_CHECKING:
     from moire.client.axis import Axis
@@ -124,6 +124,12 @@ class Survey:
         self.count_nm = axis.period_nm / STATES
         self.index = {**axis.feedback("index"), **NO_GATE}
         self.speed = axis.get_parameter("homing_search_speed")
+        self.mark_nm = axis.get_parameter("home_offset").value
+        self.travel_nm = tuple(axis.get_parameter(f"travel_{end}").value for end in ("low", "high"))
+        acceleration, jerk = (axis.get_parameter(name).value for name in ("acceleration", "jerk"))
+        seconds = self.speed.value / acceleration + acceleration / jerk
+        # twice the distance after which the speed of the search is constant, from rest
+        self.run_up_nm = self.speed.value * seconds * 10**6 + 2 * axis.period_nm
 
     def say(self, text: str) -> None:
         """Reports what is done next."""
@@ -145,7 +151,12 @@ class Survey:
         finally:
             self.restore(before.counts if not surveyed else None, velocity.counts)
         self.say("homing")
-        self.axis.home()
+        try:
+            self.axis.home()
+        except MotionFailed as failed:
+            if not found.warnings:
+                raise
+            raise NotSurveyed("index_on_edge", found.warning_words) from failed
         return found
 
     def measure(self) -> IndexSurvey:
@@ -157,8 +168,9 @@ class Survey:
         widest = max(scatter(leading), scatter(trailing))
         least = LEAST_MARGIN + widest
         gate = self.gate_of(count)
+        checks = min(CHECKS, self.passes)
         self.say("checking the gate")
-        again = [edge.count for _ in range(CHECKS) for edge in self.cross(**gated(gate))]
+        again = [edge.count for _ in range(checks) for edge in self.cross(**gated(gate))]
         self.axis.write_parameter("index_gate", gate)
         width = min(edge.place for edge in trailing) - max(edge.place for edge in leading)
         survey = IndexSurvey(
@@ -171,7 +183,7 @@ class Survey:
             warnings=(),
             shift_nm=None,
         )
-        if clear >= least and again == [count] * CHECKS:
+        if clear >= least and again == [count] * checks:
             return survey
         shift = shift_of_index(leading, trailing, least + LEAST_MARGIN)
         upwards = 1 if self.up else -1
@@ -183,7 +195,7 @@ class Survey:
 
     def refuse_two_marks(self) -> None:
         """One pass over all that a search may reach: there must be one index alone."""
-        reach = max(self.axis.get_parameter("home_distance").value, self.run_up_nm())
+        reach = max(self.axis.get_parameter("home_distance").value, self.run_up_nm)
         edges = self.cross(reach)
         if edges and scatter(edges) > CHATTER:
             apart = self.nm(scatter(edges))
@@ -204,7 +216,7 @@ class Survey:
                 raise NotSurveyed(
                     "index_missed",
                     f"{where}: {number} passes found it, the next one did not; the index is wider "
-                    f"than {units.format_length(2 * self.run_up_nm())}, its signal is weak, or it "
+                    f"than {units.format_length(2 * self.run_up_nm)}, its signal is weak, or it "
                     "is shorter than deglitch at homing_search_speed",
                 )
             if scatter(met) > CHATTER:
@@ -230,17 +242,9 @@ class Survey:
             "slower homing_search_speed or a wider index is needed",
         )
 
-    def run_up_nm(self) -> Fraction:
-        """A distance after which the speed of the search is constant, from rest."""
-        acceleration, jerk = (self.axis.get_parameter(n).value for n in ("acceleration", "jerk"))
-        speed = self.speed.value
-        return speed * (speed / acceleration + acceleration / jerk) * 10**6 + 2 * STATES * (
-            self.count_nm
-        )
-
     def cross(self, reach_nm: Fraction | None = None, **index: int) -> list[Edge]:
         """Passes the index once and returns the edges that were met."""
-        axis, reach = self.axis, reach_nm or self.run_up_nm()
+        axis, reach = self.axis, reach_nm or self.run_up_nm
         near, far = self.ends(reach)
         axis.move(nm=near)
         directions = {"up": int(self.up), "down": int(not self.up)}
@@ -266,9 +270,7 @@ class Survey:
 
     def ends(self, reach: Fraction) -> tuple[Fraction, Fraction]:
         """Where a pass starts and ends, in nm: as far as it has to, and as the travel allows."""
-        mark = self.axis.get_parameter("home_offset").value
-        low, high = (self.axis.get_parameter(f"travel_{end}").value for end in ("low", "high"))
-        least = self.run_up_nm()
+        mark, (low, high), least = self.mark_nm, self.travel_nm, self.run_up_nm
         if mark - least < low or mark + least > high:
             raise NotSurveyed(
                 "no_room",
