@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the table of effects in docs/world.md: what the stage has in a typical and a bad world,
-from sw/twin/parameters/stage.toml.
+"""Makes the tables of effects: what a machine has in a typical and a bad world, from
+sw/twin/parameters. The stage is in docs/world.md, the linear motor in docs/homing.md.
 """
 
 import sys
@@ -9,12 +9,12 @@ from pathlib import Path
 from tables import made_files
 from twin.parameters.tables import load, world
 
-PAGE = made_files.ROOT / "docs" / "world.md"
-BEGIN = "<!-- Made by tables/effects.py from sw/twin/parameters/stage.toml: do not edit. -->"
+PAGES = {"stage": "world.md", "linear_motor": "homing.md"}
+BEGIN = "<!-- Made by tables/effects.py from sw/twin/parameters/{}.toml: do not edit. -->"
 END = "<!-- End of the made table. -->"
 
 
-def rows(machine: str = "stage") -> list[str]:
+def rows(machine: str) -> list[str]:
     typical, bad = world("typical", machine), world("bad", machine)
     found = [
         f"| `{name}` | {load(machine)[name]['value']:g} | {typical[name]:g} | {bad[name]:g} | "
@@ -31,7 +31,11 @@ def rows(machine: str = "stage") -> list[str]:
 
 
 def make() -> dict[Path, str | None]:
-    return {PAGE: made_files.filled(PAGE, BEGIN, END, rows())}
+    pages = {machine: made_files.ROOT / "docs" / name for machine, name in PAGES.items()}
+    return {
+        page: made_files.filled(page, BEGIN.format(machine), END, rows(machine))
+        for machine, page in pages.items()
+    }
 
 
 if __name__ == "__main__":

@@ -232,15 +232,13 @@ class Surveyed:
         return len(self.zeros) - max(Counter(self.zeros).values(), default=0)
 
 
-def surveyed(
-    seed: int, count: int = 20, passes: int = PASSES, reach: Value = SETTINGS["home_distance"]
-) -> Surveyed:
+def surveyed(seed: int, count: int = 20, passes: int = PASSES) -> Surveyed:
     """Powers up a motor with its mark anywhere, surveys the mark, and searches the zero so many
-    times from random positions within RANGE_M of it; `reach` is its home_distance.
+    times from random positions within RANGE_M of it.
     """
     source = random.Random(seed)
     mark = any_mark(source)
-    motor = Motor(seed, {"home_distance": reach}, **mark)
+    motor = Motor(seed, **mark)
     motor.axis.enable()
     try:
         survey, refusal = motor.axis.survey_index(passes=passes), ""

@@ -56,14 +56,13 @@ def s3_zero_any_mark(
     motors: int = MOTORS,
     searches: int = SEARCHES_A_MOTOR,
     passes: int = PASSES,
-    reach: str = "1.2mm",
     seed: int = 1,
 ) -> float:
     """Surveys the mark of each motor and searches its zero; searches that found another count than
     most, of the motors that had no warning. Not a number if more than WARNED_PCT have one.
     """
     s3_zero.Motor(1)  # builds the twin once
-    survey = partial(s3_zero.surveyed, count=searches, passes=passes, reach=reach)
+    survey = partial(s3_zero.surveyed, count=searches, passes=passes)
     made = []
     with bar("motors") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
         task = progress.add_task("", total=motors)
@@ -156,8 +155,8 @@ FIGURES = {
         "survey, which may warn of 5 % of the motors",
         "0",
         Quick(
-            {"motors": 1, "searches": 2, "passes": 2, "reach": "0.6mm"},
-            "one motor, 2 searches",
+            {"motors": 1, "searches": 2, "passes": 2},
+            "one motor, 2 searches after a survey of 2 passes",
         ),
         0,
     ),

@@ -6,6 +6,7 @@ at a constant speed, in which every edge of A, B and Z is drawn again.
 import random
 from fractions import Fraction
 
+from moire.client.built import Built
 from moire.client.records import Capture
 from moire.client.values import counts_of, one_count, parameter, value_of
 from moire.errors import MotionFailed
@@ -41,12 +42,14 @@ class IndexAxis:
         hysteresis=0.0,
         slowness=1.0,
         missed=0.0,
+        queue=True,
         seed=1,
         **parameters,
     ):
         self.indexes, self.shifts, self.scatter = indexes, shifts, scatter
         self.index_scatter, self.hysteresis = index_scatter, hysteresis
         self.slowness, self.missed = slowness, missed  # of the passes; share of lost captures
+        self.queue = queue  # of captures, is built
         self.random = random.Random(seed)
         self.period_nm, self.number = PERIOD_NM, 0
         self.counts = {}
@@ -71,6 +74,9 @@ class IndexAxis:
             state = counts - 1
             gate = (3, state ^ state >> 1) if counts else (0, 0)
             self.registers["index"] |= dict(zip(("gate_mask", "gate"), gate))
+
+    def built(self):
+        return Built({"capture": int(self.queue)})
 
     def feedback(self, register):
         return dict(self.registers[register])
@@ -124,7 +130,9 @@ class IndexAxis:
             if met:
                 self.waiting.append(
                     Capture(
-                        ("index",), (met[0] - self.origin) * COUNT_NM, 0,
+                        ("index",),
+                        (met[0] - self.origin) * COUNT_NM,
+                        0,
                         met[1] / speed * self.slowness,
                     )
                 )

@@ -50,7 +50,10 @@ def test_any_index_has_a_gate_that_always_finds_the_same_count_or_a_warning(meth
         if found.warnings:
             warned += 1
         else:
-            assert len(zeros) == 1 and found.margin_nm >= found.least_margin_nm, (axis.indexes, found)
+            assert len(zeros) == 1 and found.margin_nm >= found.least_margin_nm, (
+                axis.indexes,
+                found,
+            )
     assert warned <= 7 and several >= 10  # without a gate, many of them find several counts
 
 
@@ -65,9 +68,7 @@ def test_any_index_has_a_gate_that_always_finds_the_same_count_or_a_warning(meth
     ],
 )
 def test_the_gate_that_is_clear_of_both_edges_is_chosen(begins, ends, count, clear):
-    leading, trailing = (
-        [Edge(int(place // 1), place % 1)] for place in (begins, ends)
-    )
+    leading, trailing = ([Edge(int(place // 1), place % 1)] for place in (begins, ends))
     found, margin_found = best_count(leading, trailing)
     assert found == count and margin_found == pytest.approx(clear)
     assert all(margin(other, leading, trailing) <= margin_found for other in range(-4, 12))
@@ -145,7 +146,7 @@ def test_an_index_that_its_gate_may_miss_is_reported_with_the_warning():
     causes = set()
     for number in range(40):
         try:
-            survey(IndexAxis((4.95, 0.1), index_scatter=0.1, seed=number))
+            survey(IndexAxis((4.95, 0.1), index_scatter=0.049, scatter=0.2, seed=number))
         except NotSurveyed as refused:
             causes.add(refused.cause)
             assert refused.cause != "index_on_edge" or "for every gate" in str(refused)
@@ -164,6 +165,7 @@ def test_no_index_at_all_is_the_failure_of_homing():
         ({"position_source": "phases"}, "needs position_source counts, not phases"),
         ({"decoder_mode": "every_second"}, "needs decoder_mode every_edge"),
         ({"segments": "linear"}, "needs segments off"),
+        ({"queue": False}, "needs the ages of captures: it needs HAS_CAPTURE of rtl/node.sv"),
     ],
 )
 def test_an_axis_that_has_no_such_count_is_refused_before_it_moves(parameters, words):

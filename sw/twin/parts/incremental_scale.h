@@ -59,8 +59,8 @@ class IncrementalScale {
         double distance = velocity > 0 ? upper() - position : position - lower();
         for (const IndexEdge& mark : {low_, high_})
             if (mark.passed == (velocity < 0))
-                distance = std::fmin(distance, velocity > 0 ? edge(mark) - position
-                                                            : position - edge(mark));
+                distance = std::fmin(distance,
+                                     velocity > 0 ? edge(mark) - position : position - edge(mark));
         return std::fmax(distance, 0);
     }
     // the cycle in which a body that moves on like this changes a level
@@ -69,7 +69,7 @@ class IncrementalScale {
             velocity ? distance_to_change(position, velocity) / std::fabs(velocity) * clk_hz : 1e18;
         return clk < 1e15 ? now + 1 + uint64_t(clk) : NEVER;
     }
-    int64_t counts() const { return counts_; }  // edges passed on the way up, less those down
+    int64_t counts() const { return counts_; }     // edges passed on the way up, less those down
     uint64_t changes() const { return changes_; }  // of the counts, in both directions
 
  private:

@@ -17,6 +17,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from moire import units
+from moire.client.built import remedy
 from moire.client.records import IndexSurvey
 from moire.client.values import CHOICES
 from moire.errors import MoireError, MotionFailed, NotSurveyed, OutOfRange
@@ -93,9 +94,7 @@ def best_count(leading: Sequence[Edge], trailing: Sequence[Edge]) -> tuple[int, 
     return best, found[best]
 
 
-def shift_of_index(
-    leading: Sequence[Edge], trailing: Sequence[Edge], least: float
-) -> float | None:
+def shift_of_index(leading: Sequence[Edge], trailing: Sequence[Edge], least: float) -> float | None:
     """The smallest shift of the index, in counts in the direction of the search, after which a gate
     has at least this margin; None if no shift helps.
     """
@@ -120,6 +119,8 @@ class Survey:
                 raise OutOfRange(f"the survey needs {name} {needed}, not {value.written()}")
         if (value := axis.get_parameter("segments")).counts:
             raise OutOfRange("the survey needs segments off; switch them on again afterwards")
+        if not axis.built().has("capture"):
+            raise OutOfRange(f"the survey needs the ages of captures: {remedy('capture')}")
         self.up = DIRECTIONS[method] > 0
         self.count_nm = axis.period_nm / STATES
         self.index = {**axis.feedback("index"), **NO_GATE}
