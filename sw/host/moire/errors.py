@@ -121,7 +121,9 @@ class NotCalibrated(MoireError):
 
 
 class NotSurveyed(MoireError):
-    """The index could not be surveyed. `cause` is two_indexes, index_missed, no_room or unsteady."""
+    """The index could not be surveyed. `cause` is two_indexes, index_missed, index_on_edge, no_room
+    or unsteady.
+    """
 
     def __init__(self, cause: str, sentence: str):
         super().__init__(sentence)

@@ -199,9 +199,7 @@ class IndexSurvey:
     scatter_nm: float  # range in which an edge of the index was met
     passes: int  # over each of its two edges
     warnings: tuple[str, ...]  # "index_on_edge": no gate has the least margin
-    shift_nm: (
-        float | None
-    )  # of the index, that ends the warning; None: no warning, or no shift does
+    shift_nm: float | None  # of the index, that ends the warning; None: no warning, or none helps
 
     @property
     def warning_words(self) -> str:
