@@ -238,7 +238,7 @@ def surveyed(seed: int, count: int = 20, passes: int = PASSES) -> Surveyed:
     """
     source = random.Random(seed)
     mark = any_mark(source)
-    motor = Motor(seed, **mark)
+    motor = Motor(seed, None, **mark)
     motor.axis.enable()
     try:
         survey, refusal = motor.axis.survey_index(passes=passes), ""

@@ -11,7 +11,7 @@ edges of the index keep clear of its ends.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -163,15 +163,15 @@ class Survey:
     def measure(self) -> IndexSurvey:
         """Passes the index until its gate is known, and sets it."""
         self.refuse_two_marks()
-        leading = self.edges("where the index begins")
-        trailing = self.edges("where the index ends", active_low=1 - self.index["active_low"])
+        leading = self.edges("where the index begins", {})
+        trailing = self.edges("where the index ends", {"active_low": 1 - self.index["active_low"]})
         count, clear = best_count(leading, trailing)
         widest = max(scatter(leading), scatter(trailing))
         least = LEAST_MARGIN + widest
         gate = self.gate_of(count)
         checks = min(CHECKS, self.passes)
         self.say("checking the gate")
-        again = [edge.count for _ in range(checks) for edge in self.cross(**gated(gate))]
+        again = [edge.count for _ in range(checks) for edge in self.cross(gated(gate))]
         self.axis.write_parameter("index_gate", gate)
         width = min(edge.place for edge in trailing) - max(edge.place for edge in leading)
         survey = IndexSurvey(
@@ -197,7 +197,7 @@ class Survey:
     def refuse_two_marks(self) -> None:
         """One pass over all that a search may reach: there must be one index alone."""
         reach = max(self.axis.get_parameter("home_distance").value, self.run_up_nm)
-        edges = self.cross(reach)
+        edges = self.cross({}, reach)
         if edges and scatter(edges) > CHATTER:
             apart = self.nm(scatter(edges))
             raise NotSurveyed(
@@ -207,12 +207,12 @@ class Survey:
                 "home_distance, or mask all but one",
             )
 
-    def edges(self, where: str, **index: int) -> list[Edge]:
+    def edges(self, where: str, index: Mapping[str, int]) -> list[Edge]:
         """An edge of the index, met in each pass; `index` selects which one."""
         found: list[Edge] = []
         for number in range(self.passes):
             self.say(f"{where}: pass {number + 1} of {self.passes}")
-            met = self.cross(**index)
+            met = self.cross(index)
             if not met:
                 raise NotSurveyed(
                     "index_missed",
@@ -234,7 +234,7 @@ class Survey:
         """The value of index_gate that is open in this count, from an index with any gate."""
         for gate in range(1, STATES + 1):
             self.say(f"looking for the levels of A and B: {CHOICES['index_gate'][gate]}")
-            if met := self.cross(**gated(gate)):
+            if met := self.cross(gated(gate)):
                 states = (count - met[0].count) * (1 if self.up else -1)
                 return (gate - 1 + states) % STATES + 1
         raise NotSurveyed(
@@ -243,8 +243,10 @@ class Survey:
             "slower homing_search_speed or a wider index is needed",
         )
 
-    def cross(self, reach_nm: Fraction | None = None, **index: int) -> list[Edge]:
-        """Passes the index once and returns the edges that were met."""
+    def cross(self, index: Mapping[str, int], reach_nm: Fraction | None = None) -> list[Edge]:
+        """Passes the index once, with these fields of its register, and returns the edges that were
+        met.
+        """
         axis, reach = self.axis, reach_nm or self.run_up_nm
         near, far = self.ends(reach)
         axis.move(nm=near)

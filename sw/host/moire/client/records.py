@@ -207,7 +207,7 @@ class IndexSurvey:
         if not self.warnings:
             return ""
         remedy = (
-            "no shift helps: its edges scatter too much for its width, use a cleaner or wider signal"
+            "no shift helps: its edges scatter too much for its width, use a cleaner signal"
             if self.shift_nm is None
             else f"shift the index or the reading head by {self.shift_nm / 1000:+.2f} um"
         )
