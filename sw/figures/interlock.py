@@ -38,7 +38,8 @@ WATCHDOG_S = 0.04
 ANSWER_S = 0.01  # that the longest answer takes on the bus, after its request
 CORE_SILENCE_S = 0.02 + 1_200_000 / CLK_HZ  # the node's watchdog of its soft core
 ROUND_S = 0.005  # a request on the bus, and the round of the firmware that finds it
-# nm between the position reported last and the latched one: a cut signal has any phase
+# nm between the position reported last and the latched one, beyond what the axis moves while it
+# holds: a cut signal has any phase, half a period off at most
 FORGIVEN_NM = {"encoder_cut": 400}
 CAUSES = {
     "estop": "estop",
@@ -169,7 +170,7 @@ def node_fault(
     if status.first_fault != (CAUSES[fault],):
         return f"reported as {status.first_fault}"
     off_nm = abs(axis.encoder().fault_position_nm - before.position_nm)
-    if off_nm > FORGIVEN_NM.get(fault, held_nm):
+    if off_nm > held_nm + FORGIVEN_NM.get(fault, 0):
         return f"latched position {off_nm:.0f} nm off"
     if not refused(axis.enable, "faulted"):
         return "enabled with a fault latched"

@@ -151,8 +151,8 @@ FIGURES = {
         "searches",
         "of 200 linear motors with the mark anywhere between the edges of A and B, a quarter to "
         "four periods wide, and edges with a random part of all errors of a bad world, 20 "
-        "searches each after `moire index survey`: searches that found another count without a warning of the "
-        "survey, which may warn of 5 % of the motors",
+        "searches each after `moire index survey`: searches that found another count without a "
+        "warning of the survey, which may warn of 5 % of the motors",
         "0",
         Quick(
             {"motors": 1, "searches": 2, "passes": 2},

@@ -7,7 +7,10 @@ import contextlib
 import io
 import json
 import random
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 from types import SimpleNamespace
@@ -17,8 +20,8 @@ import serial
 import serial.rfc2217
 
 from moire.bus import cobs
-from moire.bus.gateway import Gateway
-from moire.bus.protocol import request_body
+from moire.bus.gateway import Gateway, PacketClient
+from moire.bus.protocol import frame, request_body
 from moire.bus.transport import CobsBus, SerialBus, open_bus
 from moire.cli import command_line
 from moire.client.bus import Bus
@@ -74,6 +77,20 @@ def served(request):
     made.end()
 
 
+@pytest.fixture
+def homed():
+    """A gateway to a node whose axis has its zero."""
+    made = Served(homed_node())
+    yield made
+    made.end()
+
+
+def homed_node():
+    node = BusNode()
+    node.home()
+    return node
+
+
 def opened(served, entrance, parity="auto"):
     return open_bus(served.ports[entrance], parity=parity)
 
@@ -103,11 +120,11 @@ def test_the_same_work_is_done_through_every_entrance(served, entrance, parity):
         axis.enable()
         assert axis.status().state == "holding"
         assert axis.set_parameter("velocity", "7mm/s").counts == 8750
-    assert (
-        node.executed.count("enable") == 1
-        and node.axes[0].enabled
-        and node.parameter("velocity") == 8750
-    )
+        assert (
+            node.executed.count("enable") == 1
+            and node.axes[0].enabled
+            and node.parameter("velocity") == 8750
+        )
     assert node.counters["frames_bad"] == 0
 
 
@@ -215,10 +232,10 @@ def test_a_reply_that_comes_too_late_is_not_taken_for_the_next(served):
 def test_a_slow_answer_is_awaited_without_a_request_of_another_client_in_between():
     far = Rs485Bus(BusNode())
     gateway, node = Gateway(far), far.nodes[0]
-    assert gateway.answer(1, request_body("identify", 1))
+    assert gateway.arbiter.answer("A", 1, request_body("identify", 1))
     ready_at = far.now() + 0.125  # the node is planning; its hardware acknowledges requests
     far.from_nodes = lambda word: [word] if word == 0x61 or far.now() >= ready_at else []
-    assert gateway.answer(1, request_body("enable", 2, axis=0, on=1))
+    assert gateway.arbiter.answer("A", 1, request_body("enable", 2, axis=0, on=1))
     assert node.executed == ["identify", "enable"] and node.counters["repeated"] >= 1
     gateway.close()
 
@@ -226,12 +243,13 @@ def test_a_slow_answer_is_awaited_without_a_request_of_another_client_in_between
 def test_a_node_that_is_absent_delays_the_others_by_one_attempt_only():
     far = Rs485Bus(BusNode())
     gateway = Gateway(far)
-    assert gateway.answer(9, request_body("identify", 1)) == b"" and far.now() < 0.1
-    assert gateway.answer(1, request_body("identify", 1))
+    identify = request_body("identify", 0)[1:]
+    assert gateway.ask(9, identify) is None and far.now() < 0.1
+    assert gateway.ask(1, identify)
     far.from_nodes = lambda word: []
-    assert gateway.answer(1, request_body("identify", 2)) == b""
+    assert gateway.ask(1, identify) is None
     absent_at = far.now()
-    assert gateway.answer(1, request_body("identify", 3)) == b"" and far.now() < absent_at + 0.1
+    assert gateway.ask(1, identify) is None and far.now() < absent_at + 0.1
     gateway.close()
 
 
@@ -251,7 +269,73 @@ def test_a_client_that_disconnects_is_forgotten(served):
     served.wait_until(lambda: len(served.gateway.clients) == 1)  # the terminal stays
 
 
+@pytest.mark.parametrize("signal_name", ["SIGTERM", "SIGHUP", "SIGINT", "SIGKILL"])
+def test_a_process_that_is_ended_leaves_its_axis_stopped_and_off(signal_name, homed):
+    node = homed.far.nodes[0]
+    with started(homed, "move", "100mm") as process:
+        homed.wait_until(lambda: node.state() == "moving")
+        process.send_signal(getattr(signal, signal_name))
+        _, err = process.communicate(timeout=HANG_S)
+    homed.wait_until(lambda: node.state() == "off")
+    assert node.ended() == "stopped" and node.axes[0].causes == 0
+    number = getattr(signal, signal_name)
+    if number == signal.SIGKILL:
+        assert process.returncode == -number
+    else:
+        words = "interrupted" if number == signal.SIGINT else f"ended by {signal_name}"
+        assert process.returncode == 128 + number
+        assert err == f"moire: {words}; what moved was stopped under control\n"
+
+
+def test_a_process_leaves_a_drive_on_that_another_one_has_switched_on(homed):
+    node = homed.far.nodes[0]
+    with opened(homed, "tcp") as port:
+        axis = patient(port).axis()
+        axis.enable()
+        with started(homed, "move", "1um") as process:
+            while process.poll() is None:
+                axis.status()  # its watchdog hears a host that lives
+            _, err = process.communicate(timeout=HANG_S)
+        assert process.returncode == 0, err
+        assert axis.status().state == "holding" and node.written("enable") == [{"axis": 0, "on": 1}]
+
+
+def test_stopping_goes_ahead_of_all_requests_that_wait():
+    far = Rs485Bus(BusNode())
+    gateway, answers = Gateway(far), []
+    clients = [PacketClient(gateway, SimpleNamespace()) for _ in range(5)]
+    for number, client in enumerate(clients):
+        client.send = answers.append
+        last = number == len(clients) - 1
+        body = request_body(*("stop" if last else "position", number), axis=0)
+        gateway.take_packet(client, bytes([0x21]) + frame(0x21, body))
+    gateway.serve_next()
+    assert far.nodes[0].executed == ["stop"]
+    gateway.serve_next()  # the polls are one
+    assert far.nodes[0].executed == ["stop", "position"] and not gateway.waiting
+    assert len(answers) == 5
+    bodies = [cobs.body_of(cobs.PacketReader().feed(answer)[0]) for answer in answers]
+    assert [body[0] for body in bodies] == [4, 0, 1, 2, 3]
+    gateway.close()
+
+
 # ------------------------------------------------------------------ errors
+
+
+@contextlib.contextmanager
+def started(served, *words):
+    """A process of `moire` at the TCP entrance."""
+    command = [sys.executable, "-m", "moire", "--port", served.ports["tcp"]]
+    with subprocess.Popen(
+        [*command, "--patience", f"{HANG_S}s", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def complaint(text, code):
@@ -303,9 +387,8 @@ def test_no_permission_is_one_sentence(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("entrance", ["rfc2217", "tcp", "terminal"])
 def test_a_port_unplugged_during_a_move_is_one_sentence_that_names_the_watchdog(entrance):
-    served = Served()
+    served = Served(homed_node())
     node = served.far.nodes[0]
-    node.home()
     threading.Thread(
         target=lambda: (served.wait_until(lambda: "move" in node.executed), served.end())
     ).start()

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xFC589985u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xA6551EDDu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -39,6 +39,8 @@ enum bus_cause {
     BUS_CAUSE_STEPPED_PROFILE_INVALID = 25,
     BUS_CAUSE_NO_SEGMENTS = 26,    // no complete segment table is loaded
     BUS_CAUSE_SEGMENTS_IN_USE = 27,    // the segment table is in use: switch it off first
+    // another client moves this axis: wait until it has stopped, or stop it
+    BUS_CAUSE_OTHER_CLIENT = 28,
     // no good frame came from the angle sensor: check its power and its cable
     BUS_CAUSE_SENSOR_TIMED_OUT = 30,
     // the angle sensor is stuck: it sent the same angle while the table was turned
@@ -299,6 +301,7 @@ enum bus_job_flag {    // bits
     X(25, "the steps of the stepped profile are not in order, or too many") \
     X(26, "no complete segment table is loaded") \
     X(27, "the segment table is in use") \
+    X(28, "another client moves this axis") \
     X(30, "no good frame came from the angle sensor") \
     X(31, "the angle sensor is stuck") \
     X(32, "the table did not follow its steps") \

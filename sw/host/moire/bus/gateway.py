@@ -8,8 +8,11 @@ that of a simulated machine.
 
 A client of RFC 2217 with a parity uses the 9-bit bus itself. One without (8N1), and the clients of
 TCP and of the pseudo terminal, send COBS packets, for which the gateway does the exchange. Packets
-are served one after the other, and wait while an exchange of a 9-bit client is under way. A
-transport whose time is stopped runs at the speed of the clock, as far as this computer can.
+are served one after the other, and wait while an exchange of a 9-bit client is under way. What one
+client may do while another one moves an axis, and what becomes of the axes of a client that has
+gone, is decided by moire.bus.arbiter. A 9-bit client is on the bus itself, so none of this holds
+for it. A transport whose time is stopped runs at the speed of the clock, as far as this computer
+can.
 
 The loop uses selectors and not asyncio: a transport blocks while it sends, and a simulated machine
 has to run a little between two polls of the clients, so that coroutines would have nothing to wait
@@ -18,6 +21,7 @@ for together.
 
 import errno
 import os
+import random
 import selectors
 import socket
 import time
@@ -26,9 +30,18 @@ from collections.abc import Callable
 from typing import Protocol
 
 from moire.bus import rfc2217
-from moire.bus.cobs import PacketReader, address_of, body_of, sealed
+from moire.bus.arbiter import POLLS, Arbiter, is_urgent, operation_of
+from moire.bus.cobs import PacketReader, address_of, body_of, packet
 from moire.bus.exchanges import Exchanges
-from moire.bus.protocol import CRC_LENGTH, FROM_NODE, NINTH, TO_NODE, Exchange, Timing
+from moire.bus.protocol import (
+    CRC_LENGTH,
+    FROM_NODE,
+    NINTH,
+    TO_NODE,
+    Exchange,
+    Timing,
+    ready_byte,
+)
 from moire.bus.transport import BITS, Transport, plain
 from moire.errors import PortError
 
@@ -73,8 +86,11 @@ class Gateway:
         self.ninth_client: PacketClient | None = None  # the 9-bit client that sent last
         self.reply: list[int] | None = None  # its reply, as far as it has arrived
         self.held_until = self.ahead_until = 0.0
+        self.arbiter = Arbiter(self.ask, transport.now)
         self.refused = 0
         self.present: set[int] = set()  # addresses that answered their last request
+        # the last number of a request to each node: those of the clients may be alike
+        self.sequences = [random.randrange(256) for _ in range(16)]
         self.origin = time.monotonic() - transport.now()
         self.own_baud = self.baud = round(BITS / transport.character_s)
 
@@ -137,6 +153,7 @@ class Gateway:
             self.clients.remove(client)
             self.selector.unregister(client.stream)
             client.stream.close()
+            self.arbiter.depart(client)
         if client is self.ninth_client:
             self.ninth_client, self.held_until = None, 0.0
 
@@ -155,9 +172,10 @@ class Gateway:
             handle()
         if self.ninth_client is not None:
             self.forward(self.ninth_client, self.transport.receive(RECEIVE, 0))
-        if self.waiting and self.idle:
-            client, address, body = self.waiting.popleft()
-            client.send(self.answer(address, body))
+        if self.idle:
+            self.arbiter.see_off()
+            if self.waiting:
+                self.serve_next()
 
     @property
     def idle(self) -> bool:
@@ -227,23 +245,47 @@ class Gateway:
             self.refused += 1
             return
         self.waiting = deque(entry for entry in self.waiting if entry[0] is not client)
-        self.waiting.append((client, address, body))
+        if is_urgent(body):
+            self.waiting.appendleft((client, address, body))
+        else:
+            self.waiting.append((client, address, body))
 
-    def answer(self, address: int, body: bytes) -> bytes:
-        """The reply as a packet; nothing where the node does not answer."""
+    def serve_next(self) -> None:
+        """Answers the request that has waited longest, and with the same reply those of other
+        clients who poll the same.
+        """
+        client, address, body = self.waiting.popleft()
+        reply = self.arbiter.answer(client, address, body)
+        asked = [(client, body)]
+        if operation_of(body) in POLLS:
+            alike = [
+                entry for entry in self.waiting if entry[1] == address and entry[2][1:] == body[1:]
+            ]
+            for entry in alike:
+                self.waiting.remove(entry)
+                asked.append((entry[0], entry[2]))
+        if reply is not None:
+            for one, its_body in asked:
+                one.send(packet(ready_byte(address, FROM_NODE), its_body[:1] + reply[1:]))
+
+    def ask(self, address: int, body: bytes) -> bytes | None:
+        """The reply of a node, both bodies without their sequence numbers; None without a reply."""
         self.use_baud(self.own_baud)
         timing = Timing(
             self.transport.character_s,
             answer=ANSWER_S,
             quiet=max(REPLY_S, 3 * self.transport.character_s),
         )
+        sequence = self.sequences[address] = (self.sequences[address] + 1) % 256
         tries = TRIES if address in self.present else 1  # the client asks again
-        exchange = self.exchanges.run(Exchange(address, body, tries=tries, timing=timing))
+        exchange = self.exchanges.run(
+            Exchange(address, bytes([sequence]) + body, tries, timing, self.transport.handshake)
+        )
         if exchange.reply is None:
             self.present.discard(address)
-            return b""
+            return None
         self.present.add(address)
-        return sealed(bytes(exchange.received))
+        return bytes(exchange.received[3:-CRC_LENGTH])
 
 
 # ------------------------------------------------------------------ clients

@@ -16,6 +16,7 @@ from moire.made.bus_tables import LONGEST_BODY, OPERATIONS
 
 NINTH = 0x100  # marks a command byte
 TO_NODE, FROM_NODE = 2, 1  # the directions, bits 5 and 4 of a command byte
+IN_MOTION = ("homing", "moving", "settling", "stopping")  # states of an axis that moves
 READY = 0x40  # bits 7 and 6 of a ready byte are 01
 ADDRESSES = range(1, 16)
 ODD_ADDRESSES = (1, 2, 4, 7, 8, 11, 13, 14)  # those that odd parity can reach

@@ -4,6 +4,7 @@ file.
 """
 
 import os
+import signal
 import sys
 from typing import TextIO
 
@@ -12,6 +13,7 @@ from moire.cli.files import OutputError
 from moire.cli.options import Options
 from moire.cli.parser import moire, parse_call, parse_line
 from moire.cli.session import Interrupted, OpenTransport, Session
+from moire.cli.signals import Ended, ending_by_signals
 from moire.errors import MoireError
 
 __all__ = ["commands", "main", "moire", "parse_call", "parse_line"]
@@ -27,6 +29,12 @@ def main(
     completion.answer_shell()
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     session = Session(Options(json="--json" in arguments), open_transport, out, err)
+    with ending_by_signals():
+        return carry_out(session, arguments)
+
+
+def carry_out(session: Session, arguments: list[str]) -> int:
+    """Carry out the commands and close the session. Returns the exit code."""
     try:
         try:
             for planned in parse_call(arguments):
@@ -37,10 +45,12 @@ def main(
         except MoireError as error:
             session.complain(error)
             return error.exit_code
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
             session.stop_axes()
-            session.complain(Interrupted("interrupted; what moved was stopped under control"))
-            return Interrupted.exit_code
+            number = interrupt.number if isinstance(interrupt, Ended) else signal.SIGINT
+            ended = Interrupted(number)
+            session.complain(ended)
+            return ended.exit_code
     except OutputError as error:
         session.stop_axes()
         close_output(session.out)

@@ -61,9 +61,9 @@ SECTIONS = {  # of the help, in which every command appears once
     "Sensor": ("encoder", "signal", "calibrate", "commission", "correction", "segments", "index"),
     "Events": ("capture", "compare"),
     "Stations and rings": ("turn", "settings", "job", "relay"),
-    "Files, shell and simulation": ("run", "shell", "replay", "twin"),
+    "Files, shell and servers": ("run", "shell", "replay", "serve", "twin"),
 }
-STANDS_ALONE = ("run", "shell", "twin")
+STANDS_ALONE = ("run", "serve", "shell", "twin")
 
 
 class UsageError(MoireError):

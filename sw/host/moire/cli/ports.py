@@ -9,14 +9,19 @@ from moire.cli.options import Options
 from moire.errors import BadFile, PortError
 
 
-def open_port(options: Options) -> Transport:
-    """The transport of --port or of the variable MOIRE_PORT."""
+def name_of(options: Options) -> str:
+    """The port of --port or of the variable MOIRE_PORT; raises PortError."""
     port = options.port or os.environ.get("MOIRE_PORT")
     if not port:
         raise PortError(
             "no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage"
         )
-    return open_bus(port, options.baud, options.parity)
+    return port
+
+
+def open_port(options: Options) -> Transport:
+    """The transport of the port."""
+    return open_bus(name_of(options), options.baud, options.parity)
 
 
 def recorded(transport: Transport, file: str) -> Transport:

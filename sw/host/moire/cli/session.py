@@ -2,6 +2,7 @@
 """One call of `moire`: the bus that it opens, the drives that it switches on, what it prints."""
 
 import json
+import signal
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -24,9 +25,12 @@ OpenTransport = Callable[[Options], Transport]
 
 
 class Interrupted(MoireError):
-    """Ctrl-C."""
+    """Ctrl-C, or a signal that asks this process to end. The exit code is that of a shell."""
 
-    exit_code = 130
+    def __init__(self, number: int) -> None:
+        by = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+        super().__init__(f"{by}; what moved was stopped under control")
+        self.exit_code = 128 + number
 
 
 class Session:
@@ -44,17 +48,23 @@ class Session:
         self.options, self.open_transport = options, open_transport or ports.open_port
         self.out, self.err = out or sys.stdout, err or sys.stderr
         self.opened: Bus | None = None
+        # by address and axis: those whose drive this call has switched on, and those it may move
         self.switched_on: dict[tuple[int, int], Axis] = {}
+        self.used: dict[tuple[int, int], Axis] = {}
 
     @property
     def bus(self) -> Bus:
         """The bus of the port; it is opened if it is not open yet."""
         if self.opened is None:
-            transport = self.open_transport(self.options)
-            if self.options.record:
-                transport = ports.recorded(transport, self.options.record)
-            self.opened = Bus(transport, answer_s=float(self.options.patience))
+            self.opened = Bus(self.open(), answer_s=float(self.options.patience))
         return self.opened
+
+    def open(self) -> Transport:
+        """The transport of the port, opened now; whoever calls this closes it."""
+        transport = self.open_transport(self.options)
+        if self.options.record:
+            transport = ports.recorded(transport, self.options.record)
+        return transport
 
     def carry_out(self, planned: Planned) -> None:
         """One command; an error leaves with the name of the command."""
@@ -66,17 +76,22 @@ class Session:
             raise
 
     def keep_alive(self) -> None:
-        """Talk to every node whose drive this call has switched on, so that no watchdog of a node
-        switches it off while nothing else happens.
+        """Talk to every node whose drive this call needs, so that no watchdog of a node switches it
+        off while nothing else happens.
         """
-        for place, axis in list(self.switched_on.items()):
+        for place, axis in list(self.used.items()):
             if not axis.status().enabled:
-                del self.switched_on[place]
+                self.forget(place)
 
     def stop_axes(self) -> None:
-        """Stop under control what this call has switched on."""
-        for axis in self.switched_on.values():
+        """Stop under control what this call may have moved."""
+        for axis in self.used.values():
             axis.stop_if_enabled()
+
+    def forget(self, place: tuple[int, int]) -> None:
+        """The drive of this axis is off: there is nothing left to stop or to switch off."""
+        self.used.pop(place, None)
+        self.switched_on.pop(place, None)
 
     def print(self, text: str) -> None:
         """One answer on the standard output."""
@@ -161,11 +176,14 @@ class Call:
         return float(self.bus.transport.now())
 
     def switch_on(self) -> Axis:
-        """The axis, with its drive on until the end of the call."""
-        axis = self.axis
+        """The axis with its drive on. If this call has switched it on, it also switches it off at
+        its end.
+        """
+        axis, place = self.axis, (self.options.address, self.options.axis)
         if not axis.status().enabled:
             axis.enable()
-        self.session.switched_on[self.options.address, self.options.axis] = axis
+            self.session.switched_on[place] = axis
+        self.session.used[place] = axis
         return axis
 
     def say(self, values: Mapping[str, Any], text: str) -> None:

@@ -15,6 +15,7 @@ import click
 from moire.cli.completion import candidates
 from moire.cli.parser import parse_line
 from moire.cli.session import Call, Session
+from moire.cli.signals import Ended
 from moire.errors import MoireError
 
 readline: ModuleType | None
@@ -46,8 +47,8 @@ def run_shell(call: Call) -> None:
                 if not person or alive.failed:
                     raise
                 session.complain(error)
-            except KeyboardInterrupt:
-                if not person:
+            except KeyboardInterrupt as interrupt:
+                if not person or isinstance(interrupt, Ended):
                     raise
                 session.stop_axes()
                 print("\nstopped", file=session.err)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TypedDict
 
+from moire.bus.protocol import IN_MOTION
 from moire.client.names import descriptions
 from moire.errors import WrongBuild
 from moire.made.bus_tables import (
@@ -98,7 +99,7 @@ class Status:
     @property
     def in_motion(self) -> bool:
         """Whether a motion or a stop is under way."""
-        return self.state in ("homing", "moving", "settling", "stopping")
+        return self.state in IN_MOTION
 
 
 Progress = Callable[[Status], object]  # called with a Status from time to time during a motion

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xFC589985
+PROTOCOL_CRC = 0xA6551EDD
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -59,6 +59,7 @@ CAUSES = {
          "the steps of the stepped profile are not in order, or too many"),
     26: ("no_segments", "no complete segment table is loaded"),
     27: ("segments_in_use", "the segment table is in use: switch it off first"),
+    28: ("other_client", "another client moves this axis: wait until it has stopped, or stop it"),
     30: ("sensor_timed_out",
          "no good frame came from the angle sensor: check its power and its cable"),
     31: ("sensor_stuck",

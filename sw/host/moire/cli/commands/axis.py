@@ -33,10 +33,8 @@ def status(call: Call) -> None:
     example="moire --port twin enable -- wait 1s -- status",
 )
 def enable(call: Call) -> None:
-    """The drive stays on until the end of the call."""
-    axis = call.axis
-    axis.enable()
-    call.session.switched_on[call.options.address, call.options.axis] = axis
+    """If it was off, the drive stays on until the end of the call; else it stays on."""
+    call.switch_on()
     call.say_of_axis({"enabled": True}, f"{call.where}: drive on")
 
 
@@ -48,7 +46,7 @@ def enable(call: Call) -> None:
 def disable(call: Call) -> None:
     """At once, whoever has switched it on."""
     call.axis.disable()
-    call.session.switched_on.pop((call.options.address, call.options.axis), None)
+    call.session.forget((call.options.address, call.options.axis))
     call.say_of_axis({"enabled": False}, f"{call.where}: drive off")
 
 

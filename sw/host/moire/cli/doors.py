@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The doors that `serve` and `twin` open for clients: RFC 2217, TCP and a pseudo terminal."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import click
+
+from moire.bus.gateway import Gateway
+from moire.bus.transport import Transport
+from moire.cli.session import Call
+from moire.cli.values import FILE, TEXT, WHOLE
+from moire.errors import PortError
+
+RFC2217_PORT, TCP_PORT = 2217, 2218
+OPTIONS = (
+    click.option(
+        "--bind",
+        type=TEXT,
+        default="127.0.0.1",
+        metavar="HOST",
+        help="The address at which clients may connect. The default is 127.0.0.1: only this "
+        "computer.",
+    ),
+    click.option(
+        "--rfc2217",
+        type=WHOLE,
+        default=RFC2217_PORT,
+        metavar="PORT",
+        help="The port of the 9-bit bus by mark and space parity, or COBS packets by 8N1. The "
+        f"default is {RFC2217_PORT}; 0 takes any free port.",
+    ),
+    click.option(
+        "--tcp",
+        type=WHOLE,
+        default=TCP_PORT,
+        metavar="PORT",
+        help=f"The port of COBS packets. The default is {TCP_PORT}; 0 takes any free port.",
+    ),
+    click.option(
+        "--link", type=FILE, metavar="FILE", help="Make a symbolic link to the pseudo terminal."
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Doors:
+    """What the options of with_doors say."""
+
+    bind: str
+    rfc2217: int
+    tcp: int
+    link: str | None
+
+
+def with_doors(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of a command that opens the doors; its function gets the fields of Doors."""
+    for option in reversed(OPTIONS):
+        command = option(command)
+    return command
+
+
+def serve_doors(
+    call: Call,
+    transport: Transport,
+    doors: Doors,
+    words: str,
+    values: dict[str, Any],
+    duration: Fraction | None,
+) -> None:
+    """Serves a transport, which it closes in the end, until Ctrl-C or for a duration in seconds.
+
+    `words` say what is served, `values` say it as JSON.
+    """
+    gateway, bind = Gateway(transport), doors.bind
+    try:
+        by_rfc2217 = f"rfc2217://{bind}:{gateway.open_rfc2217(bind, doors.rfc2217)}"
+        by_tcp = f"socket://{bind}:{gateway.open_tcp(bind, doors.tcp)}"
+        terminal = gateway.open_pty()
+        with linked(terminal, doors.link):
+            rows = (
+                f"{words}; Ctrl-C ends it",
+                f"  {by_tcp:<28} COBS packets, for any number of clients",
+                f"  {doors.link or terminal:<28} COBS packets, for one client",
+                f"  {by_rfc2217:<28} COBS packets by 8N1; the 9-bit bus itself by mark and space "
+                "parity",
+            )
+            entrances = {"rfc2217": by_rfc2217, "tcp": by_tcp, "terminal": terminal}
+            call.say({**values, **entrances}, "\n".join(rows))
+            gateway.serve(None if duration is None else float(duration))
+    except KeyboardInterrupt:
+        pass  # the normal end
+    finally:
+        gateway.close()
+
+
+@contextmanager
+def linked(terminal: str, link: str | None) -> Iterator[None]:
+    """A symbolic link to the terminal, for as long as it is served."""
+    if link is None:
+        yield
+        return
+    try:
+        if os.path.islink(link):
+            os.unlink(link)  # of a server that was killed
+        os.symlink(terminal, link)
+    except OSError as error:
+        raise PortError(f"the link {link} cannot be made: {error.strerror}") from None
+    try:
+        yield
+    finally:
+        os.unlink(link)
