@@ -410,6 +410,7 @@ module feedback_channel #(
         // position
         .now,
         .position_valid,
+        .step_made,
         .position,
         .shifted,
         .shifted_periods,

@@ -5,7 +5,9 @@
 // rate     see position_capture, index_capture and position_compare
 // behaviour  A feature that is not built has no logic, and what it would report is 0. Without
 //          HAS_CAPTURE only the index captures, one at a time, with its position alone: that is
-//          what homing needs.
+//          what homing needs. The age of a captured position is the time since its sample; of a
+//          position made of counts it is the time since the last count, so it shows how far the
+//          event lies behind an edge of A or B.
 // source   S0: position at the index; any scale that triggers a camera or a laser
 // model    the models of its blocks; tested together by tb/system/test_feedback_counts.py
 `default_nettype none
@@ -28,6 +30,7 @@ module position_events #(
     // position
     input  wire         [31:0] now,                // cycles, time stamp
     input  wire                position_valid,     // strobe: position is new
+    input  wire                step_made,          // strobe: position moves in the next cycle
     input  wire signed  [47:0] position,           // 2^-16 period
     input  wire                shifted,            // strobe: position jumps in the next cycle
     input  wire signed  [31:0] shifted_periods,    // periods by which it jumps
@@ -37,7 +40,7 @@ module position_events #(
     input  wire                capture_clear,      // strobe: remove all captures
     output logic               present,            // level: there is a capture
     output logic        [ 6:0] captured_sources,   // one bit per source
-    output logic        [15:0] captured_age,       // cycles since the position was new
+    output logic        [15:0] captured_age,       // cycles since the sample or the last count
     output logic        [31:0] captured_time,      // cycles, time stamp
     output logic signed [47:0] captured_position,  // 2^-16 period
     output logic        [ 4:0] capture_free,       // captures that still fit, 16 at most
@@ -70,6 +73,10 @@ module position_events #(
         .software
     );
     if (HAS_CAPTURE != 0) begin : g_capture
+        logic step_made_q;
+
+        always_ff @(posedge clk) step_made_q <= step_made && !rst;
+
         position_capture #(
             .ZEROS(ZEROS)
         ) u_capture (
@@ -83,7 +90,7 @@ module position_events #(
             .probe,
             // position
             .now,
-            .valid  (position_valid),
+            .valid  (by_counts ? step_made_q : position_valid),
             .position,
             // queue
             .pop    (capture_next),
@@ -115,7 +122,8 @@ module position_events #(
         assign {captured_age, captured_time} = '0;
         assign capture_free = {4'd0, !present};
 
-        wire unused = &{1'b0, capture_sources[6:1], tick, software, probe, now, position_valid};
+        wire unused = &{1'b0, capture_sources[6:1], tick, software, probe, now};
+        wire unused_strobes = &{1'b0, position_valid, step_made};
     end
     if (HAS_COMPARE != 0) begin : g_compare
         position_compare u_compare (

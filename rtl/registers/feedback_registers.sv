@@ -113,7 +113,7 @@ module feedback_registers #(
     // strobe: an event was dropped; write 1 to clear
     input wire capture_state_overrun,
     input wire [6:0] captured_sources,  // oldest capture: sources
-    // time since its position was new [cycle]
+    // time since its sample; for a position made of counts: since the last count [cycle]
     input wire [15:0] captured_age,
     // time of the oldest capture [cycle]
     input wire [31:0] captured_time,

@@ -15,6 +15,7 @@ import argparse
 import math
 import random
 import sys
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +26,9 @@ from rich.table import Table
 from experiments.report_page import page, picture
 from moire.analysis import report
 from moire.client.bus import Bus
-from moire.client.records import Status
-from moire.errors import MoireError
+from moire.client.index_survey import PASSES
+from moire.client.records import IndexSurvey, Status
+from moire.errors import MoireError, NotSurveyed
 from moire.units import Value
 from twin import BuildError, Twin, TwinTransport
 from twin.build import ROOT
@@ -189,6 +191,64 @@ def searches(
         if done is not None:
             done(made[-1])
     return made
+
+
+# ------------------------------------------------------------------ a mark anywhere
+
+WIDEST = 16  # counts, four periods; the narrowest is one count
+
+
+def any_mark(source: random.Random) -> dict[str, float]:
+    """Parameters of a machine whose mark lies anywhere between the edges of A and B and is a
+    quarter to four periods wide; the edges have a random part of all errors of a bad world.
+    """
+    errors = parameters.world("bad", "linear_motor")
+    signs = {name: source.choice((-1, 1)) if name.endswith("_error") else 1 for name in errors}
+    return {
+        "scale_index_position": source.uniform(0, COUNTS_PER_PERIOD * COUNT_M),
+        "scale_index_width": COUNT_M * WIDEST ** source.uniform(0, 1),
+        **{name: signs[name] * source.uniform(0, bad) for name, bad in errors.items()},
+    }
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """A motor with its mark anywhere, and the zeros of its searches."""
+
+    seed: int
+    mark: Mapping[str, float]  # parameters of the machine
+    survey: IndexSurvey | None  # None: the survey refused
+    refusal: str  # its cause, or ""
+    zeros: tuple[int, ...]  # count of the scale at each zero
+
+    @property
+    def warned(self) -> bool:
+        """Whether the survey warned or refused."""
+        return self.survey is None or bool(self.survey.warnings)
+
+    @property
+    def different(self) -> int:
+        """Searches that found another count than most of them."""
+        return len(self.zeros) - max(Counter(self.zeros).values(), default=0)
+
+
+def surveyed(seed: int, count: int = 20, passes: int = PASSES) -> Surveyed:
+    """Powers up a motor with its mark anywhere, surveys the mark, and searches the zero so many
+    times from random positions within RANGE_M of it.
+    """
+    source = random.Random(seed)
+    mark = any_mark(source)
+    motor = Motor(seed, None, **mark)
+    motor.axis.enable()
+    try:
+        survey, refusal = motor.axis.survey_index(passes=passes), ""
+    except NotSurveyed as why:
+        survey, refusal = None, why.cause
+    zeros = []
+    for _ in range(count if survey else 0):
+        motor.carry(source.uniform(-RANGE_M, RANGE_M))
+        zeros.append(motor.search().zero_counts)
+    return Surveyed(seed, mark, survey, refusal, tuple(zeros))
 
 
 def zero_spread(made: Sequence[Search]) -> int:

@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of S2 and S3: counts of three scales, and the zero point of a linear motor."""
 
+import math
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
 from campaigns.campaign import Campaign, Counts
 from experiments import s3_zero
 from figures.common import Figure, Quick, bar, console, seeds, shares
+from moire.client.index_survey import PASSES
 from twin import build
 
 SEARCHES_A_POWER_UP = 10
+WARNED_PCT = 5  # of the motors; a survey that always warned would be of no use
 PROCESSES = 2
 
 
@@ -43,6 +47,42 @@ def s3_zero_um_max(count: int = 1000, seed: int = 1) -> float:
         f"{', '.join(map(str, zeros))} of the scale"
     )
     return s3_zero.zero_spread(made) * s3_zero.COUNT_M * 1e6
+
+
+MOTORS, SEARCHES_A_MOTOR = 200, 20
+
+
+def s3_zero_any_mark(
+    motors: int = MOTORS,
+    searches: int = SEARCHES_A_MOTOR,
+    passes: int = PASSES,
+    seed: int = 1,
+) -> float:
+    """Surveys the mark of each motor and searches its zero; searches that found another count than
+    most, of the motors that had no warning. Not a number if more than WARNED_PCT have one.
+    """
+    s3_zero.Motor(1)  # builds the twin once
+    survey = partial(s3_zero.surveyed, count=searches, passes=passes)
+    made = []
+    with bar("motors") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        task = progress.add_task("", total=motors)
+        for motor in pool.map(survey, seeds(seed, motors)):
+            made.append(motor)
+            progress.advance(task)
+            if motor.warned or motor.different:
+                console.print(f"{motor}")
+    warned = [motor for motor in made if motor.warned]
+    margins = [motor.survey.margin_nm for motor in made if motor.survey]
+    gates = Counter(motor.survey.gate for motor in made if motor.survey)
+    console.print(
+        f"{len(made)} motors, {sum(len(motor.zeros) for motor in made)} searches; {len(warned)} "
+        f"motors with a warning, of which {sum(motor.different > 0 for motor in warned)} found "
+        f"different counts; margin from {min(margins, default=math.nan):.0f} nm on; gates: "
+        + ", ".join(f"{gate} {number}" for gate, number in gates.items())
+    )
+    if len(warned) > max(1, len(made) * WARNED_PCT / 100):
+        return math.nan
+    return sum(motor.different for motor in made if not motor.warned)
 
 
 # ------------------------------------------------------------------ S2
@@ -106,6 +146,20 @@ FIGURES = {
         1,
         "the paper +-2",
     ),
+    "s3_zero_any_mark": Figure(
+        s3_zero_any_mark,
+        "searches",
+        "of 200 linear motors with the mark anywhere between the edges of A and B, a quarter to "
+        "four periods wide, and edges with a random part of all errors of a bad world, 20 "
+        "searches each after `moire index survey`: searches that found another count without a "
+        "warning of the survey, which may warn of 5 % of the motors",
+        "0",
+        Quick(
+            {"motors": 1, "searches": 2, "passes": 2},
+            "one motor, 2 searches after a survey of 2 passes",
+        ),
+        0,
+    ),
 }
 
 
@@ -126,7 +180,24 @@ def searches_of_part(part: int, seed: int) -> Counts:
     return {"homings": len(made), "failed": failed, "slowest search in s": slowest}
 
 
+def motor_of_part(part: int, seed: int) -> Counts:
+    motor = s3_zero.surveyed(seed, SEARCHES_A_MOTOR)
+    return {
+        "searches": len(motor.zeros),
+        "different": 0 if motor.warned else motor.different,
+        "motors with a warning": int(motor.warned),
+    }
+
+
 CAMPAIGNS = {
+    "any_mark_s3": Campaign(
+        "zero searches of linear motors of S3 with the mark anywhere, after its survey; failed: "
+        "another count than most of this motor, without a warning of the survey",
+        motor_of_part,
+        parts=5000,
+        tried="searches",
+        failed="different",
+    ),
     "homing_s3": Campaign(
         "zero searches of the linear motor of S3 from anywhere within 1 mm; failed: another count",
         searches_of_part,

@@ -8,7 +8,7 @@ import random
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import PARAMETER, PERIOD, Axis, CompiledNode
+from twin.compiled.node import DEFINES, PARAMETER, PERIOD, Axis, CompiledNode
 
 QUARTER = PERIOD // 4
 COUNTS = 1  # position_source
@@ -70,6 +70,39 @@ def test_many_searches_of_s3_give_the_same_count():
         assert ended == "ok"
         zeros.add(zero_of(machine))
     assert zeros == {QUARTER}
+
+
+@pytest.mark.parametrize(("apart", "want"), [(4, 0), (9, 9)])
+def test_a_search_of_s3_that_may_have_started_on_a_wide_index_passes_it_again(apart, want):
+    """A gated index that is wider than a period is met a period later by an axis on it."""
+    marks = [0, apart * QUARTER]
+    ended, machine = home(Axis(position=0, index=marks), -2)
+    assert ended == "ok" and zero_of(machine) == want * QUARTER
+
+
+def test_the_index_is_gated_by_the_levels_of_the_parameter_and_keeps_its_other_settings():
+    machine = CompiledNode(Axis())
+    register = machine.feedback_channels[0].word
+    offset = DEFINES["FEEDBACK_INDEX"]
+
+    def field(name):
+        mask = DEFINES[f"FEEDBACK_INDEX_{name}_MASK"]
+        return (register[offset] & mask) >> DEFINES[f"FEEDBACK_INDEX_{name}_SHIFT"]
+
+    other = DEFINES["FEEDBACK_INDEX_ACTIVE_LOW_MASK"] | DEFINES["FEEDBACK_INDEX_UP_MASK"]
+    register[offset] = other
+    for value, (gate_mask, gate) in enumerate([(0, 0), (3, 0), (3, 1), (3, 3), (3, 2)]):
+        machine.set(index_gate=value)  # {b, a}: A leads on the way up
+        assert (field("GATE_MASK"), field("GATE")) == (gate_mask, gate)
+        gates = gate_mask << DEFINES["FEEDBACK_INDEX_GATE_MASK_SHIFT"] | (
+            gate << DEFINES["FEEDBACK_INDEX_GATE_SHIFT"]
+        )
+        assert register[offset] == other | gates
+    known = PARAMETER["index_gate"]
+    assert (
+        machine.request("set_parameter", axis=0, parameter=known["id"], value=5)[0]
+        == "out_of_range"
+    )
 
 
 def test_an_interpolated_scale_takes_the_phase_zero_nearest_to_the_index():

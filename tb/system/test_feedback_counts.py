@@ -177,6 +177,26 @@ async def a_wide_index_is_captured_at_the_same_count_when_gated_by_a_and_b(dut):
 
 
 @cocotb.test()
+async def the_age_of_a_captured_index_is_the_time_since_the_count_whatever_samples_come(dut):
+    bench = await Bench.begin(dut)
+    await bench.write("index", up=1, down=1, each=1)
+    await bench.write("capture_sources", value=1)
+    for step, cycles in ((1, 0), (1, 1), (1, 40), (-1, 3), (-1, 90)):
+        bench.count += step
+        bench.pins(z=cycles == 0)
+        for cycle in range(cycles):
+            dut.sample_tick.value = int(cycle % 7 == 0)
+            await FallingEdge(dut.clk)
+        dut.sample_tick.value = 0
+        bench.pins(z=1)
+        await bench.go([], clk=1)
+        bench.pins(z=0)
+        await bench.go([])
+        assert await bench.read("captured") >> 7 == cycles
+        await bench.write("strobes", capture_next=1)
+
+
+@cocotb.test()
 async def an_armed_index_is_captured_once(dut):
     bench = await Bench.begin(dut)
     await bench.write("index", up=1)

@@ -8,6 +8,7 @@ import pytest
 from experiments import s3_zero
 from moire.errors import MotionFailed
 from tb.bench import seed
+from twin.parameters import tables as parameters
 
 SEED = seed()
 AT_MARK = {"switch_low": -1.5e-3, "switch_high": 1.5e-3}  # switches near enough for a short test
@@ -85,6 +86,20 @@ def test_methods_35_and_37_set_the_zero_here(motor, method):
     here = motor.twin.truth().scale_counts
     assert abs(home(motor, method) - here) <= 1  # the position at which the drive is enabled
     assert motor.axis.status().position_nm == pytest.approx(0, abs=2000)
+
+
+def test_a_mark_on_an_edge_of_the_scale_is_surveyed_and_its_gate_finds_one_count():
+    """In a bad world, both edges of the mark lie on those of count 1."""
+    bad = parameters.world("bad", "linear_motor")
+    motor = s3_zero.Motor(SEED, scale_index_position=8 / 9e6, scale_index_width=10 / 9e6, **bad)
+    motor.axis.enable()
+    found = motor.axis.survey_index(passes=2)
+    assert found.gate == "a_high" and not found.warnings and motor.axis.status().homed
+    assert found.margin_nm >= found.least_margin_nm
+    assert motor.zero_counts() == 1
+    motor.carry(0.2e-3)
+    assert motor.search().zero_counts == 1
+    assert motor.axis.get_parameter("velocity").written() == "50mm/s"
 
 
 def test_a_search_without_a_mark_in_reach_ends_with_its_cause_and_the_axis_under_control():

@@ -109,17 +109,26 @@ def test_friction_holds_it_below_break_away():
         assert (machine.state.position_m > 10e-6) == slides
 
 
-def test_the_mark_is_a_count_wide_and_scatters_as_stated():
+def sweeps(**scale):
+    """Traces of a motor that moves over its mark at 1 mm/s, up and down in turn: (sign, trace)."""
     machine = motor(
-        **{**FREE, "guide_viscous": 300.0}, flexure_stiffness=0, cable_stiffness=0, clk_hz=1_000_000
+        **{**FREE, "guide_viscous": 300.0},
+        **scale,
+        flexure_stiffness=0,
+        cable_stiffness=0,
+        clk_hz=1_000_000,
     )
-    lows, highs = [], []
     for sign in (1, -1) * 4:
         machine.set_position(-sign * 5e-6)
-        machine.dac(32768 + sign * round(300 * 1e-3 / 12 / AMPERE))  # 1 mm/s
+        machine.dac(32768 + sign * round(300 * 1e-3 / 12 / AMPERE))
         machine.trace(100_000)
         machine.run(0.015)
-        trace = machine.take_trace()
+        yield sign, machine.take_trace()
+
+
+def test_the_mark_is_a_count_wide_and_its_edges_scatter_as_stated():
+    lows, highs = [], []
+    for _, trace in sweeps():
         inside = trace["position_m"][trace["z"] > 0]
         lows.append(inside.min())
         highs.append(inside.max())
@@ -127,7 +136,38 @@ def test_the_mark_is_a_count_wide_and_scatters_as_stated():
     assert all(abs(low - 0.25e-6) <= slack for low in lows) and all(
         abs(high - 1.25e-6) <= slack for high in highs
     )
-    assert max(lows) - min(lows) > 0.02e-6
+    assert max(lows) - min(lows) > 0.02e-6 and max(highs) - min(highs) > 0.02e-6
+    widths = numpy.subtract(highs, lows)
+    assert widths.max() - widths.min() > 0.02e-6  # each edge scatters on its own
+
+
+@pytest.mark.parametrize("scatter", [0, 0.04])
+def test_edges_are_where_errors_of_duty_and_phase_and_their_hysteresis_put_them(scatter):
+    """9 degrees of the period are a tenth of a count; an edge is lower on the way down."""
+    shifts = {"a": {1: -0.1, 3: 0.1}, "b": {2: 0.2 - 0.1, 0: 0.2 + 0.1}}  # of counts 0 to 3
+    met = {}
+    for sign, trace in sweeps(
+        scale_duty_error=18,
+        scale_phase_error=18,
+        scale_edge_scatter=scatter,
+        scale_hysteresis=0.15,
+        scale_index_hysteresis=0.3e-6,
+        scale_index_scatter=scatter * 1e-6,
+    ):
+        at = trace["position_m"] * 1e6  # counts
+        for name, edges in shifts.items():
+            changed = at[1:][numpy.diff(trace[name]) != 0]
+            places = [4 * period + n + edges[n] for period in (-1, 0, 1) for n in edges]
+            places = numpy.sort([place - 0.15 * (sign < 0) for place in places])
+            for place in places[(places > -4) & (places < 4)]:
+                nearest = changed[abs(changed - place).argmin()]
+                met.setdefault((name, sign, round(place, 3)), []).append(nearest - place)
+        inside = at[trace["z"] > 0]
+        for end, place in ((inside.min(), 0.25), (inside.max(), 1.25)):
+            met.setdefault(("z", sign, place), []).append(end - place + 0.3 * (sign < 0))
+    for where, errors in met.items():
+        assert len(errors) == 4 and max(map(abs, errors)) <= scatter + 0.022, (where, errors)
+        assert not scatter or numpy.ptp(errors) > 0.005
 
 
 def test_the_scale_counts_every_micrometre_both_ways():

@@ -24,7 +24,9 @@
 #define S3_METHOD (-2)
 #define STANDSTILL_MS 4u          // an axis is at standstill if in this time it
 #define STANDSTILL_DISTANCE 8192  // moves by less than an eighth of a period
-#define CLEAR_DISTANCE 65536      // a search that finds the index sooner may have started on it
+#define CLEAR_DISTANCE \
+    131072  // a search that finds the index sooner may have started on it:
+            // a gated one is met again after a period
 #define LONGEST_SEARCH (1LL << 46)
 #define CAPTURE_INDEX 1u  // bit of capture_sources
 

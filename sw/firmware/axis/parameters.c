@@ -101,6 +101,17 @@ static void apply_source(unsigned axis) {
                                        : (uint32_t)parameters[axis][BUS_PARAMETER_DECODER_MODE]);
 }
 
+// Gates the index by A and B. The four gates follow each other on the way up, where A leads. The
+// user owns the other fields of the register.
+static void apply_index(unsigned axis) {
+    uint32_t gate = (uint32_t)parameters[axis][BUS_PARAMETER_INDEX_GATE], state = gate - 1u,
+             other = feedback_read(axis, FEEDBACK_INDEX) &
+                     ~(FEEDBACK_INDEX_GATE_MASK_MASK | FEEDBACK_INDEX_GATE_MASK);
+    if (gate)
+        other |= FEEDBACK_INDEX_GATE_MASK_MASK | FIELD_PUT(FEEDBACK_INDEX_GATE, state ^ state >> 1);
+    feedback_write(axis, FEEDBACK_INDEX, other);
+}
+
 static uint32_t step_cycles(unsigned axis, uint8_t id) {
     return saturate(cycles_of(parameters[axis][id]) + 1u, STEP_CYCLES_MASK);
 }

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x48CB8B1Bu    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xF4687388u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -983,8 +983,11 @@ enum bus_parameter {
     BUS_PARAMETER_SEGMENTS = 90,
     // [1/65536] fine stage: derivative gain, for the change of the error in a tick
     BUS_PARAMETER_FINE_KD = 91,
+    // index: it counts only at these levels of A and B: 0 any, 1 both low, 2 A high, 3 both high, 4
+    // B high; found by `moire index survey`
+    BUS_PARAMETER_INDEX_GATE = 92,
 };
-#define BUS_PARAMETER_COUNT 91u
+#define BUS_PARAMETER_COUNT 92u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define BUS_PARAMETERS(X) \
@@ -1078,7 +1081,8 @@ enum bus_parameter {
     X(segment_length, 88, 1LL, 70368744177664LL, 81920000LL) \
     X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
     X(segments, 90, 0LL, 2LL, 0LL) \
-    X(fine_kd, 91, 0LL, 16777215LL, 0LL)
+    X(fine_kd, 91, 0LL, 16777215LL, 0LL) \
+    X(index_gate, 92, 0LL, 4LL, 0LL)
 
 // X(parameter, field of axis.built without which it accepts only 0 and its default)
 #define BUS_PARAMETER_NEEDS(X) \
@@ -1182,7 +1186,8 @@ enum bus_parameter {
     X(SOURCE, source) \
     X(STEPS, steps) \
     X(DAC, dac) \
-    X(FILTERS, filters)
+    X(FILTERS, filters) \
+    X(INDEX, index)
 
 #define BUS_PARAMETERS_APPLIED(X) \
     X(VELOCITY, MOTION) \
@@ -1217,7 +1222,8 @@ enum bus_parameter {
     X(FILTER_2_B2, FILTERS) \
     X(FILTER_2_A1, FILTERS) \
     X(FILTER_2_A2, FILTERS) \
-    X(PROFILE, MOTION)
+    X(PROFILE, MOTION) \
+    X(INDEX_GATE, INDEX)
 
 enum bus_setting {
     // [0.01 arcsec] turn: it has ended when the remainder by the sensor is not larger than this
@@ -1283,6 +1289,6 @@ enum bus_setting {
     X(job_speed, 20, 1LL, 100LL, 100LL)
 
 // Of all parameters and settings: it changes with the meaning of a saved number.
-#define BUS_VALUES_CRC 0x7AE15DE2u
+#define BUS_VALUES_CRC 0xD2740A3Au
 
 #endif

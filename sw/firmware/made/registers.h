@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x2986fe28u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x7c2b604fu  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -1242,7 +1242,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_CAPTURED_SOURCES_MASK 0x0000007fu
 #define FEEDBACK_CAPTURED_SOURCES_SHIFT 0
 #define FEEDBACK_CAPTURED_SOURCES_WIDTH 7
-// time since its position was new [cycle]
+// time since its sample; for a position made of counts: since the last count [cycle]
 #define FEEDBACK_CAPTURED_AGE_MASK 0x007fff80u
 #define FEEDBACK_CAPTURED_AGE_SHIFT 7
 #define FEEDBACK_CAPTURED_AGE_WIDTH 16

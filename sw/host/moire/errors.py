@@ -120,6 +120,16 @@ class NotCalibrated(MoireError):
         self.cause = cause
 
 
+class NotSurveyed(MoireError):
+    """The index could not be surveyed. `cause` is two_indexes, index_missed, index_on_edge, no_room
+    or unsteady.
+    """
+
+    def __init__(self, cause: str, sentence: str):
+        super().__init__(sentence)
+        self.cause = cause
+
+
 Failure = TypeVar("Failure", Refused, MotionFailed)
 
 

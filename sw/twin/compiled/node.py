@@ -345,7 +345,8 @@ class FeedbackChannel:
 
     def index(self, clk: int, position: int) -> None:
         """An index mark passes at a position."""
-        if self.armed:
+        each = self.word.get(DEFINES["FEEDBACK_INDEX"], 0) & DEFINES["FEEDBACK_INDEX_EACH_MASK"]
+        if self.armed or each:
             self.armed = False
             self.capture(INDEX, clk, position)
 

@@ -58,7 +58,7 @@ SECTIONS = {  # of the help, in which every command appears once
     ),
     "Faults": ("fault", "reset"),
     "Parameters and tuning": ("params", "tune", "scope"),
-    "Sensor": ("encoder", "signal", "calibrate", "commission", "correction", "segments"),
+    "Sensor": ("encoder", "signal", "calibrate", "commission", "correction", "segments", "index"),
     "Events": ("capture", "compare"),
     "Stations and rings": ("turn", "settings", "job", "relay"),
     "Files, shell and servers": ("run", "shell", "replay", "serve", "twin", "study"),

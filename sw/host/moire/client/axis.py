@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from moire import units
-from moire.client import calibration
+from moire.client import calibration, index_survey
 from moire.client.access import COUNTS, FULL_SCALE
 from moire.client.capture import AxisCapture
 from moire.client.names import CAUSE_CODES, bit_names, code_name, descriptions
@@ -19,6 +19,7 @@ from moire.client.records import (
     Correction,
     Drive,
     Encoder,
+    IndexSurvey,
     Progress,
     Signal,
     Status,
@@ -309,6 +310,24 @@ class Axis(AxisParameters, AxisCapture):
     def resume(self) -> Fraction:
         """Continues with the override before pause(); at full speed if another host paused."""
         return self.override(self.override_before_pause or 1)
+
+    # index
+
+    def survey_index(
+        self, progress: Callable[[str], object] | None = None, passes: int = index_survey.PASSES
+    ) -> IndexSurvey:
+        """Measures where the index lies between the edges of A and B, sets the parameter
+        index_gate to the levels of A and B that keep clear of its edges, and homes the axis.
+
+        The axis must be enabled, and home_method must search the index. It is homed first, and then
+        passes the index in the direction of the search, `passes` times over each of its edges.
+        `progress` is called with what is done next. Raises NotSurveyed, Refused or MotionFailed;
+        index_gate is then unchanged. A result with warnings has no gate that is safe.
+        """
+        if passes < 2:
+            raise OutOfRange(f"a survey makes at least 2 passes over each edge, not {passes}")
+        survey = index_survey.Survey(self, passes, progress)
+        return self.stopping_on_error(survey.run)
 
     # correction of sine and cosine
 

@@ -190,6 +190,35 @@ class Capture:
 
 
 @dataclass(frozen=True)
+class IndexSurvey:
+    """How an index lies between the edges of A and B, and its gate. See Axis.survey_index()."""
+
+    gate: str  # of the parameter index_gate
+    margin_nm: float  # by which the index may move until another count is found
+    least_margin_nm: float  # for what was not seen: a share of a count, and the scatter
+    width_nm: float  # of the index
+    scatter_nm: float  # range in which an edge of the index was met
+    passes: int  # over each of its two edges
+    warnings: tuple[str, ...]  # "index_on_edge": no gate has the least margin
+    shift_nm: float | None  # of the index, that ends the warning; None: no warning, or none helps
+
+    @property
+    def warning_words(self) -> str:
+        """What the warning means, and what to do about it; empty without one."""
+        if not self.warnings:
+            return ""
+        remedy = (
+            "no shift helps: its edges scatter too much for its width, use a cleaner signal"
+            if self.shift_nm is None
+            else f"shift the index or the reading head by {self.shift_nm / 1000:+.2f} um"
+        )
+        return (
+            "the index lies on an edge of A or B for every gate, so that a search may find another "
+            f"count: {remedy}, and survey it again"
+        )
+
+
+@dataclass(frozen=True)
 class Compare:
     """The state of position compare."""
 

@@ -23,6 +23,7 @@ CHOICES = {
     "step_invert": ("none", "step", "direction", "both"),
     "filters": ("none", "first", "second", "both"),
     "segments": ("off", "rectangle", "linear"),
+    "index_gate": ("any", "both_low", "a_high", "both_high", "b_high"),
     "turn_direction": ("direct", "shorter", "up"),
     "peer_mode": ("off", "legacy", "frames"),
     "peer_role": ("main", "sub"),

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x48CB8B1B
+PROTOCOL_CRC = 0xF4687388
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -818,6 +818,10 @@ PARAMETERS = {parameter.name: parameter for parameter in (
     Parameter("fine_kd", 91, "", Fraction(1, 65536),
               0, 16777215, 0,
               "fine stage: derivative gain, for the change of the error in a tick", "FINE_STAGE"),
+    Parameter("index_gate", 92, "", Fraction(1, 1),
+              0, 4, 0,
+              "index: it counts only at these levels of A and B: 0 any, 1 both low, 2 A high, 3 "
+              "both high, 4 B high; found by `moire index survey`"),
 )}
 
 SETTINGS = {parameter.name: parameter for parameter in (

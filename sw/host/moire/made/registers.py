@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x2986FE28  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x7C2B604F  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -1550,7 +1550,7 @@ FIELDS = (
         "feedback", "captured", "age",
         0x68, 7, 16, False, "r", "cycle",
         Fraction(1, 1),
-        "time since its position was new",
+        "time since its sample; for a position made of counts: since the last count",
     ),
     Field(
         "feedback", "captured_time", "value",
