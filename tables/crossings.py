@@ -35,7 +35,9 @@ BOX = ROOT / "sw" / "figures" / "counter_box_bench.sv"  # a top around a node, a
 CLOCKS = {"clk", "clock"}
 RESET = "rst"
 FLAT = "proc; flatten; opt_clean; write_json {netlist}"
-BOXES = "read_verilog -sv -lib -nowb +/ecp5/cells_bb.v +/ice40/cells_sim.v rtl/node.sv"  # of the tops
+BOXES = (
+    "read_verilog -sv -lib -nowb +/ecp5/cells_bb.v +/ice40/cells_sim.v rtl/node.sv"  # of the tops
+)
 AROUND = "proc; opt_clean; write_json {netlist}"
 BITWISE = {"$mux": "AB", "$and": "AB", "$or": "AB", "$xor": "AB", "$not": "A"}
 FLIP_FLOP = re.compile(r"\$_?(s?dff|aldff|adff|dlatch|sr)")

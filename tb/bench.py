@@ -118,7 +118,8 @@ def run(top, test, **parameters):
         tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
     family = os.environ.get("NETLIST")
     request = os.environ.get("MUTANTS")
-    variants = [power_up and "power_up", counts and "coverage", request and "mutants"]
+    late = crossings.seed() and "crossings"
+    variants = [power_up and "power_up", counts and "coverage", request and "mutants", late]
     kind = "-".join(filter(None, [sim, family, *variants]))
     shared = ROOT / "build" / kind / tag
     own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
@@ -179,7 +180,6 @@ def run(top, test, **parameters):
                 waves=waves,
                 plusargs=plusargs,
                 extra_env=environment,
-                plusargs=crossings.plusargs() + random_state(power_up),
             )
         )
     except (

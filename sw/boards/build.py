@@ -105,9 +105,7 @@ def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float
     family, made = design.board.part.family, folder.relative_to(ROOT) / "placed"
     written = (PLACED[family][1], made)
     mhz = design.board.node_hz / 1e6
-    return placed(
-        netlist, family, chip(design), mhz, seed, *pinned(design, folder), *written
-    )
+    return placed(netlist, family, chip(design), mhz, seed, *pinned(design, folder), *written)
 
 
 def pack(design: Design, folder: Path) -> Path:
