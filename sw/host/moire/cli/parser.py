@@ -32,7 +32,7 @@ that it has switched on.
 
 Exit codes: 0 done; 1 the node refused, or a motion ended badly; 2 wrong usage, value or file;
 3 nobody answers, or the bus is garbled; 4 the port does not work; 5 node and host were made from
-different sources; 130 interrupted (Ctrl-C stops a moving axis under control).
+different sources; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP: a moving axis was stopped under control.
 
 Completion of commands, options and names by the Tab key, for bash (or zsh, fish):
   eval "$(_MOIRE_COMPLETE=bash_source moire)"
