@@ -37,7 +37,8 @@ PROGRAMS = ROOT / "build" / "venv" / "bin"
 COMMAND = re.compile(r"(moire|make|export|pip|build/venv/bin/\w+)\b")
 HARDWARE = re.compile(r"/dev/ttyUSB0|COM3|socket://127\.0\.0\.1:2218")
 RESOLVED_ONLY = re.compile(r"make (test$|check|figures|soak|board|load|flash)")
-ENDLESS = re.compile(r"moire\b.* watch\b|moire watch\b")
+ENDLESS = re.compile(r"moire\b.* (watch|serve)\b|moire (watch|serve)\b")
+SERVER = re.compile(r"moire\b.* serve$")  # any free ports: the served twin may have the usual ones
 EXPERIMENT = re.compile(r"build/venv/bin/python -m experiments\.")
 LONGEST_S = 6  # of an experiment, unless the whole is asked for; its twin is built within 4
 ENDLESS_S = 4  # of a command that only Ctrl-C ends
@@ -143,6 +144,8 @@ class Session:
             words = words.replace("install", "install --dry-run --no-deps --no-build-isolation")
         if words.startswith("make") and RESOLVED_ONLY.match(words):
             words = words.replace("make", "make -n", 1)
+        if SERVER.match(words):
+            words += " --rfc2217 0 --tcp 0"
         limit, may_be_stopped = PATIENCE_S, False
         if ENDLESS.match(words):
             limit, may_be_stopped = ENDLESS_S, True
