@@ -75,7 +75,7 @@ module position_events #(
     if (HAS_CAPTURE != 0) begin : g_capture
         logic step_made_q;
 
-        always_ff @(posedge clk) step_made_q <= step_made && !rst;
+        always_ff @(posedge clk) step_made_q <= step_made;
 
         position_capture #(
             .ZEROS(ZEROS)
