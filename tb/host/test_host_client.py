@@ -733,7 +733,7 @@ def test_ctrl_c_while_waiting_for_a_motion_stops_it():
 
 
 def test_home_stores_the_requested_method():
-    axes = [Axis(START, SWITCH, index=[SWITCH + 2 * PERIOD])]
+    axes = [Axis(START, SWITCH, index=[SWITCH + 8 * PERIOD])]
     wire, node, axis = stage(axes=axes)
     axis.enable()
     for method, counts in ((35, 35), ("17", 17), ("s3", -2), ("s0", -1)):
