@@ -60,6 +60,12 @@ def served() -> Iterator[Server]:
         thread.join()
 
 
+def hear_signals() -> None:
+    """In a new process: a shell lets its background jobs ignore Ctrl-C, which they inherit."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
 @contextmanager
 def client(server: Server, way: str, target_mm: int) -> Iterator[Callable[[], None]]:
     """A client that moves the axis; what it yields ends the client in this way."""
@@ -75,7 +81,10 @@ def client(server: Server, way: str, target_mm: int) -> Iterator[Callable[[], No
         move += ["--no-wait", "--", "watch", "--every", "20ms"]
     common = [sys.executable, "-m", "moire", "--port", server.port, "--patience", f"{PATIENCE_S}s"]
     with subprocess.Popen(
-        [*common, *move], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        [*common, *move],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=hear_signals,
     ) as process:
         assert process.stdout is not None
         try:

@@ -19,6 +19,7 @@ import pytest
 import serial
 import serial.rfc2217
 
+from figures.clients import hear_signals
 from moire.bus import cobs
 from moire.bus.gateway import Gateway, PacketClient
 from moire.bus.protocol import frame, request_body
@@ -331,6 +332,7 @@ def started(served, *words):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=hear_signals,
     ) as process:
         try:
             yield process
