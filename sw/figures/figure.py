@@ -69,7 +69,8 @@ def measure(name: str, figure: Figure, quick: bool, seed: int | None) -> Outcome
 def measure_module(module: str, seed: int | None) -> list[Outcome]:
     """Short forms of all figures of a module, in a process of its own; what they print is kept."""
     outcomes = []
-    for name, figure in import_module(f"figures.{module}").FIGURES.items():
+    # a module may have campaigns alone
+    for name, figure in getattr(import_module(f"figures.{module}"), "FIGURES", {}).items():
         console.file = io.StringIO()
         done = measure(name, figure, True, seed)
         facts = console.file.getvalue()
