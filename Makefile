@@ -13,6 +13,8 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 RTL      := $(shell find rtl -name '*.sv' | sort)
 LINTED   := $(RTL:%.sv=build/lint/%.ok)
 FIRMWARE := build/firmware/firmware.hex
+LITEX    := build/litex/stamp
+GOWIN    := build/gowin/stamp
 
 say = @printf '%s\n' '--- $(1)'
 
@@ -119,6 +121,28 @@ coverage: $(SETUP) $(FIRMWARE) ## what the tests reach of RTL, firmware and host
 board: $(SETUP)   ## the bitstream and the wiring page of a machine on a board: BOARD=x MACHINE=y; docs/boards.md
 	@$(PYTHON) -m boards.build --board '$(BOARD)' --machine '$(MACHINE)' $(if $(SEED),--seed $(SEED))
 
+litex: $(LITEX)   ## LiteX into build/litex, for sw/embed/litex_soc.py and its test; docs/embedding.md
+
+$(LITEX): sw/embed/litex.lock | $(SETUP)
+	@rm -rf $(@D)
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
+	@touch $@
+
+chromium: $(SETUP) ## Chromium by apt-get, and Playwright, which drives it in the tests of the live page; docs/page.md
+	@command -v chromium > /dev/null || { $(AS_ROOT) apt-get -q update && $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
+		apt-get -qy install --no-install-recommends chromium fonts-dejavu-core; } > build/chromium.log 2>&1 < /dev/null \
+		|| { echo "apt-get could not install chromium, see build/chromium.log: install it and run this again" >&2; false; }
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps -r tools/chromium.lock
+
+AS_ROOT = $$([ "$$(id -u)" = 0 ] || echo sudo -n)
+
+gowin: $(GOWIN)   ## placement and bitstreams for Gowin parts into build/gowin, for `make board`; docs/boards.md
+
+$(GOWIN): sw/boards/gowin.lock | $(SETUP)
+	@rm -rf $(@D)
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
+	@touch $@
+
 clean:            ## remove what was built; the tools in build/venv stay (rm -rf build removes them too)
 	@[ ! -d build ] || find build -mindepth 1 -maxdepth 1 ! -name venv -exec rm -rf {} +
 	@find . -name __pycache__ -not -path './build/*' -prune -exec rm -rf {} +
@@ -127,4 +151,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board litex gowin chromium clean

@@ -44,7 +44,7 @@ def board_row(one: Board) -> list[str]:
     return [
         f"[`{one.name}`]({link(one.file)})",
         one.title,
-        f"{one.part.name}: {one.part.lut} LUT4, {one.part.block_ram} block RAMs",
+        f"{one.part.name}: {one.part.lut} LUT, {one.part.block_ram} block RAMs",
         f"{one.node_hz / 1e6:g} MHz",
         str(len(own)),
         levels(one),
@@ -60,11 +60,12 @@ def kind(axis: Axis) -> str:
 
 def machine_row(one: Machine) -> list[str]:
     kinds = sorted({kind(axis) for axis in one.axes})
+    firmware = f"`{one.image}`, {one.core} core, {one.memory_kib} KiB"
     return [
         f"[`{one.name}`]({link(one.file)})",
         one.title,
-        f"{len(one.axes)}: {'; '.join(kinds)}",
-        f"`{one.image}`, {one.core} core, {one.memory_kib} KiB",
+        "none" if one.orders else f"{len(one.axes)}: {'; '.join(kinds)}",
+        "none" if one.orders else firmware,
     ]
 
 
@@ -88,7 +89,7 @@ def make() -> dict[Path, str]:
         ),
         *table("machine, what it is, axes, firmware", [machine_row(one) for one in machines]),
         *table(
-            "command, LUT4 or logic cells by estimate, block RAMs by estimate, signals",
+            "command, LUT or logic cells by estimate, block RAMs by estimate, signals",
             [design_row(one) for one in designs],
         ),
         *(["", "Wired, but too large:", ""] * bool(refused)),

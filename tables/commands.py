@@ -9,8 +9,9 @@ from typing import cast
 import click
 
 from moire.cli.command_line import moire
+from moire.cli.commands import SECTIONS
 from moire.cli.options import COMMON, Common
-from moire.cli.parser import EXAMPLES, SECTIONS, Command, Group, Several
+from moire.cli.parser import EXAMPLES, Command, Group, Several
 from tables import made_files
 from tables.made_files import ROOT
 
@@ -26,7 +27,11 @@ HEAD = [
 
 def below(command: Shown) -> Mapping[str, Shown]:
     """The commands of a group by name; none if the command is no group."""
-    return cast(Mapping[str, Shown], command.commands) if isinstance(command, Group) else {}
+    if not isinstance(command, Group):
+        return {}
+    context = click.Context(command)
+    names = command.list_commands(context)
+    return {name: cast(Shown, command.get_command(context, name)) for name in names}
 
 
 def help_of(one: click.Command | click.Parameter) -> str:
@@ -70,11 +75,10 @@ def page(name: str, command: Shown) -> str:
 
 def first_page() -> str:
     out = [*HEAD, "# The commands of moire", "", help_of(moire)]
+    made = below(moire)
     for title, names in SECTIONS.items():
         out += ["", f"## {title}", "", "| command | |", "| --- | --- |"]
-        out += [
-            f"| [`{name}`]({name}.md) | {words(help_of(moire.commands[name]))} |" for name in names
-        ]
+        out += [f"| [`{name}`]({name}.md) | {words(help_of(made[name]))} |" for name in names]
     out += ["", "## Options of every command", *table(COMMON)]
     out += ["", "## How they go together", "", "```", EXAMPLES.strip(), "```", ""]
     return "\n".join(out)

@@ -35,9 +35,7 @@ BOX = ROOT / "sw" / "figures" / "counter_box_bench.sv"  # a top around a node, a
 CLOCKS = {"clk", "clock"}
 RESET = "rst"
 FLAT = "proc; flatten; opt_clean; write_json {netlist}"
-BOXES = (
-    "read_verilog -sv -lib -nowb +/ecp5/cells_bb.v +/ice40/cells_sim.v rtl/node.sv"  # of the tops
-)
+BOXES = "read_verilog -sv -lib -nowb rtl/node.sv rtl/relay.sv"  # of the tops
 AROUND = "proc; opt_clean; write_json {netlist}"
 BITWISE = {"$mux": "AB", "$and": "AB", "$or": "AB", "$xor": "AB", "$not": "A"}
 FLIP_FLOP = re.compile(r"\$_?(s?dff|aldff|adff|dlatch|sr)")
@@ -237,16 +235,16 @@ def elaborated(
     return Netlist(json.loads(file.read_text())["modules"][source.stem])
 
 
-def wrong_pins(top: Path, node: Mapping[str, str]) -> Iterator[str]:
-    """The asynchronous inputs of a top that do not go to asynchronous ports of its node, and those
-    that flip-flops of the top take.
+def wrong_pins(top: Path, cells: str, inside: Mapping[str, str]) -> Iterator[str]:
+    """The asynchronous inputs of a top that do not go to asynchronous ports of its node or relay,
+    and those that flip-flops of the top take. `cells` is the file of the part's primitives.
     """
-    netlist = elaborated(top, {}, AROUND, BOXES)
+    netlist = elaborated(top, {}, AROUND, f"{BOXES} {cells}")
     for port, comment in inputs_of(top).items():
         for start in netlist.bits(port):
             for name, at, _ in netlist.sinks(start):
                 cell = netlist.module["cells"][name]
-                kind = kind_of(node.get(at, "")) if is_module(cell["type"]) else "stored"
+                kind = kind_of(inside.get(at, "")) if is_module(cell["type"]) else "stored"
                 if kind != kind_of(comment):
                     yield f"{top.parent.name}/{top.name}: {port} reaches {at} of {name}"
 
@@ -256,9 +254,12 @@ def designs() -> dict[str, Path]:
     return {name: ROOT / "rtl" / f"{name}.sv" for name in WHOLE}
 
 
-def tops() -> list[Path]:
-    """The tops of boards and boxes."""
-    return [BOX, *(write(design) / "top.sv" for design in fitting()[0])]
+def tops() -> list[tuple[Path, str]]:
+    """The tops of boards and boxes, and the files of the primitives of their parts."""
+    of_boards = (
+        (write(one) / "top.sv", f"+/{one.board.part.family.cells}") for one in fitting()[0]
+    )
+    return [(BOX, ""), *of_boards]
 
 
 def years(seconds: float) -> str:
@@ -303,7 +304,8 @@ def generate() -> dict[Path, str | None]:
             for port, words in comments.items()
             if kind_of(words) != "asynchronous"
         ]
-    if wrong := [one for top in tops() for one in wrong_pins(top, inputs_of(designs()["node"]))]:
+    inside = {port: words for one in designs().values() for port, words in inputs_of(one).items()}
+    if wrong := [one for top, cells in tops() for one in wrong_pins(top, cells, inside)]:
         raise ValueError("\n".join(wrong))
     delays = [
         f"`{one.path}` of the {one.design} is no crossing: it delays levels of `clk`."

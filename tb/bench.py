@@ -27,9 +27,11 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
+from embed.design import EXAMPLES
 from mutation import block
 from twin import build as twin_build
 from twin import crossings, netlist
+from twin.build import rtl_path
 
 ROOT = Path(__file__).resolve().parent.parent
 BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself
@@ -42,20 +44,6 @@ def package(name):
     """Folder of an installed package, without importing it."""
     spec = find_spec(name)
     return Path(spec.submodule_search_locations[0]) if spec else None
-
-
-def search_path():
-    """Every folder in which a module is found by its name: the model of the crossings, the rooms of
-    rtl/, and the packages of the soft cores.
-    """
-    rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
-    cores = package("pythondata_cpu_picorv32"), package("pythondata_cpu_serv")
-    places = "verilog", "verilog/rtl"
-    return (
-        crossings.folders()
-        + rooms
-        + [core / place for core, place in zip(cores, places, strict=True) if core]
-    )
 
 
 def source_of(top):
@@ -98,8 +86,8 @@ def direct_verilator(runner, waves):
 
 def run(top, test, **parameters):
     """Build module `top` with `parameters` and run the cocotb tests in the file `test`. Files are
-    found by name: a bench top beside the test, among the figures or in BENCHES, every other module
-    under rtl/.
+    found by name: a bench top beside the test, among the figures, the examples or in BENCHES, every
+    other module under rtl/.
     """
     __tracebackhide__ = True
     power_up, counts = os.environ.get("POWER_UP"), os.environ.get("RTL_COVERAGE")
@@ -108,7 +96,7 @@ def run(top, test, **parameters):
         bool(os.environ.get("WAVES")),
         Path(test).resolve(),
     )
-    folders = (here.parent, ROOT / "sw" / "figures", BENCHES)
+    folders = (here.parent, ROOT / "sw" / "figures", EXAMPLES, BENCHES)
     benches = [folder / f"{top}.sv" for folder in folders]
     source = next((bench for bench in benches if bench.exists()), None) or source_of(top)
     name = os.environ.get("PYTEST_CURRENT_TEST", "run").split("::")[-1].split(" ")[0]
@@ -128,7 +116,7 @@ def run(top, test, **parameters):
         get_runner(sim),
         own if sim == "icarus" else shared,
     )  # Icarus compiles at once: nothing to share
-    args = [a for d in search_path() for a in ("-y", str(d))]
+    args = [a for d in (*rtl_path(), EXAMPLES) for a in ("-y", str(d))]
     if sim == "icarus":
         sources, args = [], [*args, "-Y.sv", "-Y.v", "-Wall", "-Wno-timescale"]
     else:
@@ -207,7 +195,7 @@ def random_state(power_up):
 
 def of_netlist(sim, family, source, parameters):
     """(other sources, source of the top, arguments) of the simulation of a module's netlist."""
-    *others, top = netlist.sources(family, source, parameters, search_path())
+    *others, top = netlist.sources(family, source, parameters, rtl_path())
     return others, top, quiet(sim)
 
 
@@ -225,7 +213,7 @@ def of_mutants(request, source, parameters, name):
     asked = json.loads(file.read_text())
     if source.stem != asked["block"]:
         pytest.skip(f"there are mutants of {asked['block']} only")
-    folder = block.prepared(source, parameters, search_path(), asked["count"], asked["seed"])
+    folder = block.prepared(source, parameters, rtl_path(), asked["count"], asked["seed"])
     found = block.Run.found(file.parent, folder)
     numbers = [m.number for m in block.mutants_of(folder) if m.number not in found]
     block.Run(str(folder), parameters, numbers).write(file.parent / f"{name}.json")

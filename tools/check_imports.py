@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cycles among modules, and imports that go round the package system.
 
-- Python: the modules of moire, twin, boards, campaigns, code_coverage, experiments, figures, fuzz,
-  firmware, mutation, study, tables, tools and tb import each other without a cycle, deferred
+- Python: the modules of moire, twin, boards, campaigns, code_coverage, embed, experiments, figures,
+  fuzz, firmware, mutation, study, tables, tools and tb import each other without a cycle, deferred
   imports included;
 - nothing outside tb imports from tb, and moire imports none of the others;
 - nothing patches sys.path or loads a file by an import spec;
@@ -29,6 +29,7 @@ PACKAGES = {
     "boards": "sw/boards",
     "campaigns": "sw/campaigns",
     "code_coverage": "sw/code_coverage",
+    "embed": "sw/embed",
     "experiments": "sw/experiments",
     "figures": "sw/figures",
     "firmware": "sw/firmware",

@@ -30,17 +30,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tools import ROOT
+from tools import ROOT, obey_signals
 from twin.build import SHORT_RUNS
 
 PROGRAMS = ROOT / "build" / "venv" / "bin"
 COMMAND = re.compile(r"(moire|make|export|pip|build/venv/bin/\w+)\b")
 HARDWARE = re.compile(r"/dev/ttyUSB0|COM3|socket://127\.0\.0\.1:2218")
-RESOLVED_ONLY = re.compile(r"make (test$|check|figures|soak|board|load|flash)")
+RESOLVED_ONLY = re.compile(r"make (test$|check|figures|soak|board|litex|gowin|chromium|load|flash)")
 ENDLESS = re.compile(r"moire\b.* (watch|serve)\b|moire (watch|serve)\b")
 SERVER = re.compile(r"moire\b.* serve$")  # any free ports: the served twin may have the usual ones
 EXPERIMENT = re.compile(r"build/venv/bin/python -m experiments\.")
-LONGEST_S = 6  # of an experiment, unless the whole is asked for; its twin is built within 4
+LONGEST_S = 4  # of an experiment, unless the whole is asked for
 ENDLESS_S = 4  # of a command that only Ctrl-C ends
 PATIENCE_S = 600  # of every other command
 
@@ -119,7 +119,7 @@ class Session:
             env=self.environment,
             stdout=subprocess.PIPE,
             text=True,
-            preexec_fn=obey_ctrl_c,
+            preexec_fn=obey_signals,
         )
         assert self.server.stdout
         answer = json.loads(self.server.stdout.readline() or "{}")
@@ -145,7 +145,7 @@ class Session:
         if words.startswith("make") and RESOLVED_ONLY.match(words):
             words = words.replace("make", "make -n", 1)
         if SERVER.match(words):
-            words += " --rfc2217 0 --tcp 0"
+            words += " --http 0 --rfc2217 0 --tcp 0"
         limit, may_be_stopped = PATIENCE_S, False
         if ENDLESS.match(words):
             limit, may_be_stopped = ENDLESS_S, True
@@ -161,7 +161,7 @@ class Session:
     def need_port(self) -> None:
         """Serve the machine of the page unless something is served already."""
         if not self.server:
-            self.serve(f"twin --machine {self.page.machine} --rfc2217 0 --tcp 0")
+            self.serve(f"twin --machine {self.page.machine} --http 0 --rfc2217 0 --tcp 0")
 
     def run_program(self, program: str) -> str | None:
         """Run a Python program of the page against the served twin."""
@@ -184,11 +184,6 @@ class Session:
             fcntl.flock(self.usual_ports, fcntl.LOCK_UN)
 
 
-def obey_ctrl_c() -> None:
-    """In a new process: a shell lets its background jobs ignore Ctrl-C, which they inherit."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
 def execute(
     words: str, here: Path, environment: dict[str, str], limit_s: float, may_be_stopped: bool
 ) -> str | None:
@@ -202,7 +197,7 @@ def execute(
         stderr=subprocess.STDOUT,
         text=True,
         start_new_session=True,
-        preexec_fn=obey_ctrl_c,
+        preexec_fn=obey_signals,
     ) as process:
         try:
             output, _ = process.communicate(timeout=limit_s)

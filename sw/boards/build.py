@@ -10,7 +10,9 @@ python -m boards.build --board x --machine y [--only-files]
 
 import argparse
 import hashlib
+import json
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,8 +20,9 @@ from typing import Any
 from boards import board as boards
 from boards import machine as machines
 from boards.board import Board
+from boards.family import Placer
 from boards.fit import Design, fit
-from boards.generate import BITSTREAM, CONSTRAINTS, files
+from boards.generate import files
 from boards.machine import Machine
 from boards.size import firmware_stem
 from boards.toml_file import ROOT, Misfit, TooLarge, shown
@@ -27,16 +30,13 @@ from figures.synthesis import SynthesisError, placed, run, yosys
 from firmware import build as firmware
 
 OUT = ROOT / "build" / "boards"
-TOOLS = Path(sys.executable).parent
-CELLS = {  # the primitives of a family, for the PLL of the top
-    "ecp5": "read_verilog -lib +/ecp5/cells_bb.v",
-    "ice40": "read_verilog -lib +/ice40/cells_sim.v",
-}
-PLACED = {"ecp5": ("--lpf", "--textcfg"), "ice40": ("--pcf", "--asc")}  # options of nextpnr
-PACK = {"ecp5": ["yowasp-ecppack", "--compress"], "ice40": ["yowasp-icepack"]}
-USED = {  # words and cells of nextpnr's report
-    "ecp5": {"LUT": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAM": "DP16KD"},
-    "ice40": {"logic cells": "ICESTORM_LC", "block RAM": "ICESTORM_RAM"},
+KINDS = {  # of cells of a 7-series part, by the beginning of their names
+    "LUT": "LUT",
+    "FD": "flip-flops",
+    "CARRY4": "carry chains of 4 bits",
+    "RAMB36": "block RAMs of 36 kbit",
+    "RAMB18": "of 18 kbit",
+    "DSP48": "multipliers",
 }
 
 
@@ -58,6 +58,11 @@ def fitting() -> tuple[list[Design], list[str]]:
     return found, refused
 
 
+def placeable() -> list[Design]:
+    """The designs that open tools place."""
+    return [design for design in fitting()[0] if design.board.part.family.placer]
+
+
 def write(design: Design) -> Path:
     """Writes what is made before any tool runs; returns the folder."""
     folder = OUT / design.name
@@ -68,8 +73,10 @@ def write(design: Design) -> Path:
 
 
 def make_firmware(design: Design, folder: Path) -> str:
-    """Builds the firmware of the node, and reports its size."""
+    """Builds the firmware of the node, and reports its size; a relay has none."""
     machine = design.machine
+    if not machine.image:
+        return f"{machine.name} has no firmware"
     chosen = machine.image, len(machine.axes), machine.core
     try:
         return firmware.build(1024 * machine.memory_kib, folder, False, *chosen)
@@ -77,42 +84,58 @@ def make_firmware(design: Design, folder: Path) -> str:
         raise Misfit(f"{machine.file}: {why}") from None
 
 
+def check_tools(design: Design) -> None:
+    """Refuses a part whose tools are not there."""
+    part = design.board.part
+    target = part.family.fetched
+    if target and not (ROOT / "build" / target / "stamp").is_file():
+        raise Misfit(
+            f"{design.board.file}: the tools for a {part.name} are missing: make {target} gets them"
+        )
+
+
 def synthesise(design: Design, folder: Path) -> Path:
     """The netlist of the top."""
-    part = design.board.part
-    last = f"synth_{part.family} {part.synthesis} -top {{top}} -json {{netlist}}"
-    return yosys(folder / "top.sv", {}, last, f"board-{design.name}", CELLS[part.family])
+    part, family = design.board.part, design.board.part.family
+    written = family.netlist.replace("{folder}", str(folder.relative_to(ROOT)))
+    last = f"{family.synthesis} {part.synthesis} -top {{top}} {written}"
+    return yosys(folder / "top.sv", {}, last, f"board-{design.name}", family.read_cells)
+
+
+def placer(design: Design) -> Placer:
+    """How the part of a design is placed."""
+    found = design.board.part.family.placer
+    if found is None:
+        raise Misfit(f"{design.board.file}: no open tool places a {design.board.part.name}")
+    return found
 
 
 def chip(design: Design) -> list[str]:
     """The options of nextpnr for the part."""
-    part = design.board.part
-    speed = ["--speed", str(part.speed)] if part.speed else []
-    return [f"--{part.device}", "--package", part.package, *speed]
+    return placer(design).chip(design.board.part)
 
 
 def pinned(design: Design, folder: Path) -> list[str | Path]:
     """The options of nextpnr for the placement and the pins. The path is that from the root, since
     a YoWASP tool has a /tmp of its own.
     """
-    family = design.board.part.family
-    pins = folder.relative_to(ROOT) / CONSTRAINTS[family]
-    return [*design.board.part.place, PLACED[family][0], pins]
+    part = design.board.part
+    pins = folder.relative_to(ROOT) / part.family.constraints
+    return [*part.place, *placer(design).pins(pins)]
 
 
 def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float, dict[str, Any]]:
     """(MHz, utilization) after place and route; a clock that is not reached is a result."""
-    family, made = design.board.part.family, folder.relative_to(ROOT) / "placed"
-    written = (PLACED[family][1], made)
-    mhz = design.board.node_hz / 1e6
+    family, mhz = design.board.part.family.name, design.board.node_hz / 1e6
+    written = placer(design).made(folder.relative_to(ROOT) / "placed")
     return placed(netlist, family, chip(design), mhz, seed, *pinned(design, folder), *written)
 
 
 def pack(design: Design, folder: Path) -> Path:
     """The bitstream; for a serial core the image of the flash, with the firmware behind it."""
-    made, here = folder / BITSTREAM, folder.relative_to(ROOT)
-    tool, *options = PACK[design.board.part.family]
-    words = [TOOLS / tool, *options, here / "placed", here / BITSTREAM]
+    part, here = design.board.part, folder.relative_to(ROOT)
+    made = folder / part.family.bitstream
+    words = placer(design).pack(part, here / "placed", made.relative_to(ROOT))
     run(words, "packing", folder / "pack.log")
     if design.machine.core == "serial":
         program = (folder / f"{firmware_stem(design.machine)}.bin").read_bytes()
@@ -129,14 +152,24 @@ def used(design: Design, utilization: Mapping[str, Any]) -> str:
     """What a design takes of its part."""
     words = [
         f"{utilization[cell]['used']} of {utilization[cell]['available']} {name}"
-        for name, cell in USED[design.board.part.family].items()
+        for name, cell in placer(design).used.items()
     ]
     return ", ".join(words)
+
+
+def cells(netlist: Path) -> str:
+    """The largest kinds of cells of a netlist, for a part that is not placed."""
+    found: Counter[str] = Counter()
+    for cell in json.loads(netlist.read_text())["modules"]["top"]["cells"].values():
+        kind = cell["type"]
+        found[next((words for start, words in KINDS.items() if kind.startswith(start)), "")] += 1
+    return ", ".join(f"{found[words]} {words}" for words in KINDS.values() if found[words])
 
 
 def state(folder: Path, made: Sequence[str]) -> str:
     """A hash of all that goes into the bitstream."""
     sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", Path(__file__)]
+    sources += [Path(__file__).with_name(name) for name in ("family.py", "gowin.lock")]
     sources += [folder / name for name in made] + sorted(folder.glob("*.hex"))
     found = hashlib.sha256()
     for path in sources:
@@ -146,12 +179,18 @@ def state(folder: Path, made: Sequence[str]) -> str:
 
 def bitstream(design: Design, seed: int, say: Callable[[str], None]) -> Path:
     """The bitstream of a machine on a board; nothing is built if nothing has changed."""
+    check_tools(design)
     folder, node_mhz = write(design), design.board.node_hz / 1e6
     say(f"--- {design.name}: wiring: {shown(folder / 'wiring.html')}")
     say(make_firmware(design, folder))
+    if design.board.part.family.placer is None:
+        say(f"--- {design.name}: synthesis")
+        say(cells(synthesise(design, folder)))
+        return folder / design.board.part.family.script
     note, now = folder / "note", f"{state(folder, list(files(design)))} seed {seed}"
-    if (folder / BITSTREAM).is_file() and note.is_file() and note.read_text() == now:
-        return folder / BITSTREAM
+    made = folder / design.board.part.family.bitstream
+    if made.is_file() and note.is_file() and note.read_text() == now:
+        return made
     note.unlink(missing_ok=True)
     say(f"--- {design.name}: synthesis")
     netlist = synthesise(design, folder)
@@ -163,7 +202,7 @@ def bitstream(design: Design, seed: int, say: Callable[[str], None]) -> Path:
             f"{design.name} reaches {mhz:.1f} MHz with seed {seed} and needs {node_mhz:g}: try "
             "another SEED"
         )
-    made = pack(design, folder)
+    pack(design, folder)
     note.write_text(now)
     return made
 
@@ -192,6 +231,13 @@ def main() -> None:
         made = bitstream(design, options.seed, say)
     except (Misfit, SynthesisError) as why:
         sys.exit(f"board: {why}")
+    part, bits = design.board.part, made.with_name(design.board.part.family.bitstream)
+    if part.family.placer is None:
+        print(
+            f"no open tool places a {part.name}: vivado -mode batch -source {shown(made)} makes "
+            f"{shown(bits)}; load it with: {design.board.loader} {shown(bits)}"
+        )
+        return
     print(f"{shown(made)}; load it with: {design.board.loader} {shown(made)}")
 
 

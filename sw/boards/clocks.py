@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settings of the PLL between the oscillator of a board and the clock of its node."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from boards.toml_file import Misfit
 
-# ECP5 (FPGA-DS-02012) and iCE40 UltraPlus (FPGA-DS-02008): Hz of the oscillator of the PLL
+# ECP5 (FPGA-DS-02012), iCE40 UltraPlus (FPGA-DS-02008) and iCE40 HX (FPGA-DS-02029): Hz of the
+# oscillator of the PLL
 ECP5_VCO = 400_000_000, 800_000_000
 ICE40_VCO = 533_000_000, 1_066_000_000
+XC7_VCO = 800_000_000, 1_600_000_000  # PLLE2 of a 7-series part (DS181), grades 1 and 1L
+XC7_DETECTOR = 19_000_000, 450_000_000
+XC7_TARGET = 1_000_000_000
 ECP5_MOST = 128  # largest divider
 ECP5_TARGET = 600_000_000  # the middle of the range
 ICE40_FILTER = ((17, 1), (26, 2), (44, 3), (66, 4), (101, 5), (134, 6))  # MHz below, setting
@@ -55,13 +60,36 @@ def ice40(input_hz: int, output_hz: int) -> list[Pll]:
     return [pll for *_, pll in sorted(found, key=lambda each: each[:2])]
 
 
-def pll(family: str, input_hz: int, output_hz: int, file: str) -> Pll | None:
-    """The PLL of a board; None if the node runs at the clock of the board. It is exact, since the
-    node derives all its times from its clock.
+def xc7(input_hz: int, output_hz: int) -> list[Pll]:
+    """What a PLLE2_BASE can make, the best first."""
+    found = []
+    for divide in range(1, 57):
+        if not XC7_DETECTOR[0] <= input_hz / divide <= XC7_DETECTOR[1]:
+            continue
+        for output in range(1, 129):
+            multiply, left = divmod(output_hz * output * divide, input_hz)
+            vco = output_hz * output
+            if not left and 2 <= multiply <= 64 and XC7_VCO[0] <= vco <= XC7_VCO[1]:
+                settings = {"DIVCLK_DIVIDE": divide, "CLKFBOUT_MULT": multiply}
+                settings["CLKOUT0_DIVIDE"] = output
+                found.append((divide, abs(vco - XC7_TARGET), Pll(settings, output_hz)))
+    return [pll for *_, pll in sorted(found, key=lambda each: each[:2])]
+
+
+def none(_input_hz: int, _output_hz: int) -> list[Pll]:
+    """Of a family whose PLL is not used: the node runs at the clock of the board."""
+    return []
+
+
+def pll(
+    makes: Callable[[int, int], list[Pll]], input_hz: int, output_hz: int, file: str
+) -> Pll | None:
+    """The PLL of a board, out of what its family makes; None if the node runs at the clock of the
+    board. It is exact, since the node derives all its times from its clock.
     """
     if input_hz == output_hz:
         return None
-    best = (ecp5 if family == "ecp5" else ice40)(input_hz, output_hz)
+    best = makes(input_hz, output_hz)
     if not best or best[0].output_hz != output_hz:
         nearest = f"; the nearest is {best[0].output_hz:.0f} Hz" if best else ""
         raise Misfit(f"{file}: [clock] the PLL makes no {output_hz} Hz of {input_hz} Hz{nearest}")

@@ -4,7 +4,7 @@
 from dataclasses import dataclass, replace
 
 from boards import clocks, size
-from boards.board import Board, Pad
+from boards.board import FLASH, Board, Pad
 from boards.machine import DRIVES, FEATURES, Between, Machine, Signal, Wiring
 from boards.toml_file import Misfit, TooLarge
 
@@ -33,7 +33,7 @@ class Design:
     board: Board
     machine: Machine
     connections: list[Connection]
-    parameters: dict[str, int | str]  # of rtl/node.sv
+    parameters: dict[str, int | str]  # of the module of the machine
     pll: clocks.Pll | None  # None: the node runs at the clock of the board
     estimate: size.Size
     turned: list[str]  # connectors whose buffers were turned
@@ -54,7 +54,9 @@ def mask(machine: Machine, name: str) -> int:
 
 
 def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
-    """The parameters of the node."""
+    """The parameters of the node or of the relay."""
+    if machine.orders:
+        return {"K": machine.orders, "CLK_HZ": board.node_hz}
     found: dict[str, int | str] = {
         "CLK_HZ": board.node_hz,
         "AXES": len(machine.axes),
@@ -113,6 +115,15 @@ def check_direction(board: Board, machine: Machine, one: Connection) -> None:
         )
 
 
+def check_enable(board: Board, machine: Machine, one: Connection) -> None:
+    """Refuses an enable of a drive that is high before the configuration."""
+    if one.pad.pulled_up and one.signal.group == "drive_enable":
+        raise Misfit(
+            f"{machine.file}: {one.name} must be low before the configuration, but {one.pad.place} "
+            f"of {board.file} is pulled up by the board"
+        )
+
+
 def check_volts(board: Board, machine: Machine, one: Connection) -> None:
     """Refuses an input above the level that its pin takes, and an output of another level than the
     part behind it takes.
@@ -140,6 +151,9 @@ def connected(board: Board, machine: Machine) -> list[Connection]:
         if not any(pad.through for pad in pads):
             raise Misfit(f"{where} turned: {board.file} has no buffers at a connector {name}")
     signals = machine.signals()
+    if strange := [name for name in wiring.unused if name not in signals]:
+        raise Misfit(f"{where} unused: {strange[0]} is no signal of this machine")
+    signals = {name: signal for name, signal in signals.items() if name not in wiring.unused}
     if unknown := [name for name in wiring.pins if name not in signals]:
         raise Misfit(f"{where} {unknown[0]} is no signal of this machine, or it is in `unused`")
     for name, signal in signals.items():
@@ -156,10 +170,9 @@ def connected(board: Board, machine: Machine) -> list[Connection]:
 
 def used_on_board(board: Board, machine: Machine) -> list[Pad]:
     """The pads of the board itself that the node uses."""
-    flash = machine.core == "serial"
     return [
         board.clock,
-        *(pad for name, pad in board.on_board.items() if flash or not name.startswith("flash")),
+        *(pad for name, pad in board.on_board.items() if machine.has_flash or name not in FLASH),
         *board.address,
         *board.leds.values(),
     ]
@@ -185,7 +198,7 @@ def check_twice(board: Board, machine: Machine, connections: list[Connection]) -
 def check_bus(board: Board, machine: Machine) -> None:
     """Refuses a node that nobody can talk to."""
     on_usb = "usb_rx" in board.on_board and "usb_tx" in board.on_board
-    if not on_usb and "rs485_rx" in machine.unused:
+    if not on_usb and "rs485_rx" in [*machine.unused, *wiring_for(board, machine).unused]:
         raise Misfit(f"{machine.file}: {board.file} has no USB serial port: connect rs485_rx")
 
 
@@ -193,18 +206,22 @@ def check_part(board: Board, machine: Machine, needed: size.Size) -> None:
     """Refuses what the part cannot hold, by estimate."""
     part, count = board.part, len(machine.axes)
     counted = f"{count} axis" if count == 1 else f"{count} axes"
-    for words, need, most in (
+    words = f"{counted} with {machine.memory_kib} KiB need"
+    if machine.orders:
+        words = f"a relay of {machine.orders} orders needs"
+    for of_what, need, most in (
         ("block RAM", needed.block_ram, part.block_ram),
         ("LUT", needed.lut, part.lut),
     ):
         if need > most:
             raise TooLarge(
-                f"{machine.file}: {counted} with {machine.memory_kib} KiB need "
-                f"about {need} {words}, but {part.name} of {board.file} has {most}"
+                f"{machine.file}: {words} about {need} {of_what}, but {part.name} of {board.file} "
+                f"has {most}"
             )
-    if machine.core == "serial":
-        if missing := [name for name in size.FLASH if name not in board.on_board]:
-            raise Misfit(f"{machine.file}: a serial core needs {missing[0]}, {board.file} has none")
+    if machine.has_flash:
+        reader = "relay" if machine.orders else "serial core"
+        if missing := [name for name in FLASH if name not in board.on_board]:
+            raise Misfit(f"{machine.file}: a {reader} needs {missing[0]}, {board.file} has none")
     cycles = board.node_hz // TICK_HZ
     if (taken := size.tick_cycles(machine)) > cycles:
         raise Misfit(
@@ -219,10 +236,11 @@ def fit(board: Board, machine: Machine) -> Design:
     check_twice(board, machine, connections)
     for one in connections:
         check_direction(board, machine, one)
+        check_enable(board, machine, one)
         check_volts(board, machine, one)
     check_bus(board, machine)
-    needed = size.estimate(board.part.family, machine)
+    needed = size.estimate(board.part.family.name, machine)
     check_part(board, machine, needed)
-    pll = clocks.pll(board.part.family, board.clock_hz, board.node_hz, board.file)
+    pll = clocks.pll(board.part.family.plls, board.clock_hz, board.node_hz, board.file)
     turned = wiring_for(board, machine).turned
     return Design(board, machine, connections, parameters(board, machine), pll, needed, turned)

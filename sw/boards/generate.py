@@ -8,9 +8,9 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from boards.board import Pad
+from boards.board import FLASH, LEDS, Pad
 from boards.fit import Connection, Design
-from boards.machine import AXIS_SIGNALS
+from boards.machine import AXIS_SIGNALS, RELAY_SIGNALS
 
 TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).with_name("templates")),
@@ -20,13 +20,16 @@ TEMPLATES = Environment(
     lstrip_blocks=True,
     keep_trailing_newline=True,
 )
-CONSTRAINTS = {"ecp5": "pins.lpf", "ice40": "pins.pcf"}
-BITSTREAM = "moire.bit"
 NODE_OUTPUTS = (  # besides those of the axes
     *("rs485_tx", "rs485_driver_enable", "flash_cs_n", "flash_sclk", "flash_mosi"),
     *("i2c_scl_low", "i2c_sda_low", "keyboard_clock_low", "keyboard_data_low", "edm_clock_low"),
     *("edm_data_low", "peer_tx", "display_cs_n", "display_sclk", "display_data"),
 )
+RELAY_OUTPUTS = (
+    *("relay_a", "relay_b", "relay_z", "correcting", "fault", "rs485_tx", "rs485_driver_enable"),
+    *("flash_chip_n", "flash_sclk", "flash_sdo"),
+)
+RELAY_FLASH = {"flash_cs_n": "flash_chip_n", "flash_sclk": "flash_sclk", "flash_mosi": "flash_sdo"}
 PERIPHERAL_INPUTS = {  # at the levels at which nothing happens
     **dict.fromkeys(("i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data"), "1'b1"),
     **dict.fromkeys(("edm_clock", "edm_data", "peer_rx", "sensor_rx"), "1'b1"),
@@ -49,11 +52,6 @@ class Pin:
         return f"{'input  wire ' if self.direction == 'in' else 'output logic'} {self.port}"
 
 
-def has_flash(design: Design) -> bool:
-    """Whether the firmware comes out of the flash."""
-    return design.machine.core == "serial"
-
-
 def has_usb(design: Design) -> bool:
     return {"usb_rx", "usb_tx"} <= set(design.board.on_board)
 
@@ -63,12 +61,14 @@ def pins(design: Design) -> list[Pin]:
     board = design.board
     found = [Pin("clock", "in", board.clock, f"{board.clock_hz / 1e6} MHz")]
     for name, pad in board.on_board.items():
-        if has_flash(design) or not name.startswith("flash"):
-            timing = ", synchronous to flash_sclk" if name == "flash_miso" else ""
+        if design.machine.has_flash or name not in FLASH:
+            # the relay synchronises what comes from its flash
+            timed = name == "flash_miso" and not design.machine.orders
+            timing = ", synchronous to flash_sclk" if timed else ""
             found.append(Pin(name, pad.direction, pad, f"pin {pad.ball}{timing}"))
     found += [
         Pin(f"address_{n}", "in", pad, f"static: switch, bit {n} of the address on the bus")
-        for n, pad in enumerate(board.address)
+        for n, pad in enumerate([] if design.machine.orders else board.address)
     ]
     found += [
         Pin(f"led_{name}", "out", pad, f"{'0' if board.leds_low else '1'}: on")
@@ -82,15 +82,21 @@ def pins(design: Design) -> list[Pin]:
 
 
 def outputs(design: Design) -> dict[str, int]:
-    """{output of the node: its bits}"""
+    """{output of the node or relay: its bits}"""
+    if design.machine.orders:
+        return dict.fromkeys(RELAY_OUTPUTS, 1)
     axes = len(design.machine.axes)
     found = {name: axes for name, signal in AXIS_SIGNALS.items() if signal.direction == "out"}
     return found | dict.fromkeys(NODE_OUTPUTS, 1)
 
 
 def inputs(design: Design) -> dict[str, str]:
-    """{input of the node: what it is connected to}"""
+    """{input of the node or relay: what it is connected to}"""
     ports = {one.name: one.port for one in design.connections}
+    heard = ["usb_rx"] * has_usb(design) + ["rs485_rx"] * ("rs485_rx" in ports)
+    if design.machine.orders:
+        encoder = {name: ports.get(name, "1'b0") for name in RELAY_SIGNALS if "encoder" in name}
+        return {**encoder, "rs485_rx": " & ".join(heard), "flash_sdi": "flash_miso"}
 
     def bits(*names: str) -> str:
         """An input with these bits of each axis, the highest first."""
@@ -102,7 +108,6 @@ def inputs(design: Design) -> dict[str, str]:
         return "{" + ", ".join(each) + "}"
 
     switches = [f"address_{n}" for n in reversed(range(len(design.board.address)))]
-    heard = ["usb_rx"] * has_usb(design) + ["rs485_rx"] * ("rs485_rx" in ports)
     return {
         "address": f"{{{', '.join(switches)}}}" if switches else f"4'd{design.machine.address}",
         "rs485_rx": " & ".join(heard),
@@ -113,7 +118,7 @@ def inputs(design: Design) -> dict[str, str]:
             if signal.direction == "in" and not name.startswith("probe")
         },
         "probe": bits("probe_1", "probe_0"),
-        "flash_miso": "flash_miso" if has_flash(design) else "1'b0",
+        "flash_miso": "flash_miso" if design.machine.has_flash else "1'b0",
         **PERIPHERAL_INPUTS,
     }
 
@@ -121,9 +126,11 @@ def inputs(design: Design) -> dict[str, str]:
 def shown(design: Design) -> dict[str, str]:
     """{what a LED may show: the expression}"""
     given = inputs(design)
+    of_all = {"running": "locked && !rst", "sending": "node_rs485_driver_enable"}
+    if design.machine.orders:
+        return {**dict.fromkeys(LEDS, "1'b0"), **of_all, "drive_fault": "node_fault"}
     return {
-        "running": "locked && !rst",
-        "sending": "node_rs485_driver_enable",
+        **of_all,
         "estop": given["estop_open"],
         "limit_high": f"|{given['limit_high_open']}",
         "limit_low": f"|{given['limit_low_open']}",
@@ -140,7 +147,9 @@ def assigned(design: Design) -> dict[str, str]:
     found = {f"led_{name}": f"{on}({shown(design)[name]})" for name in board.leds}
     if has_usb(design):
         found["usb_tx"] = "node_rs485_tx"
-    if has_flash(design):
+    if design.machine.orders:
+        found |= {name: f"node_{output}" for name, output in RELAY_FLASH.items()}
+    elif design.machine.has_flash:
         found |= {name: f"node_{name}" for name in NODE_OUTPUTS if name.startswith("flash")}
     number = {axis.name: n for n, axis in enumerate(design.machine.axes)}
     for one in design.connections:
@@ -211,7 +220,7 @@ def unconnected(design: Design) -> list[str]:
     """Signals of the machine that are listed as not connected."""
     machine = design.machine
     of_axes = [f"{axis.name}.{name}" for axis in machine.axes for name in axis.unused]
-    return [*machine.unused, *of_axes]
+    return [*machine.unused, *machine.wiring[design.board.layout].unused, *of_axes]
 
 
 def page(design: Design) -> str:
@@ -222,7 +231,7 @@ def page(design: Design) -> str:
         connections=design.connections,
         unconnected=unconnected(design),
         level=level,
-        bitstream=BITSTREAM,
+        bitstream=design.board.part.family.bitstream,
     )
 
 
@@ -240,8 +249,14 @@ def top(design: Design) -> str:
 
 def files(design: Design) -> dict[str, str]:
     """{name: text} of all that is made before any tool runs."""
-    constraints = CONSTRAINTS[design.board.part.family]
+    family = design.board.part.family
+    constraints, script = family.constraints, family.script
+    for_vendor = {}
+    if script:
+        template = TEMPLATES.get_template(f"{script}.jinja")
+        for_vendor[script] = template.render(d=design, bitstream=design.board.part.family.bitstream)
     return {
+        **for_vendor,
         "top.sv": top(design),
         constraints: TEMPLATES.get_template(f"{constraints}.jinja").render(
             d=design, pins=pins(design)

@@ -10,9 +10,9 @@ from typing import Any
 
 from boards.toml_file import ROOT, Misfit, Table, read
 from firmware.build import IMAGES
+from moire.bus.protocol import MOST_AXES
 
 FOLDER = ROOT / "constraints" / "machines"
-MOST_AXES = 8  # of a node
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,18 @@ NODE_SIGNALS = {
     "rs485_driver_enable": Signal("out", "rs485", "1: drive the bus"),
     "estop_open": Signal("in", "estop", "1: emergency stop pressed or wire cut", needs="drive"),
 }
-GROUPS = sorted({signal.group for signal in (AXIS_SIGNALS | NODE_SIGNALS).values()})
+RELAY_SIGNALS = {
+    **{name: AXIS_SIGNALS[name] for name in ("encoder_a", "encoder_b", "encoder_z")},
+    "relay_a": Signal("out", "relay", "A to the controller"),
+    "relay_b": Signal("out", "relay", "B to the controller"),
+    "relay_z": Signal("out", "relay", "index to the controller"),
+    "correcting": Signal("out", "status", "1: the output is corrected"),
+    "fault": Signal("out", "status", "1: a flag is set"),
+    **{name: NODE_SIGNALS[name] for name in ("rs485_rx", "rs485_tx", "rs485_driver_enable")},
+}
+SIGNALS = AXIS_SIGNALS | NODE_SIGNALS | RELAY_SIGNALS
+GROUPS = sorted({signal.group for signal in SIGNALS.values()})
+MOST_ORDERS = 16  # of a relay whose timing and size are known
 
 
 @dataclass(frozen=True)
@@ -109,17 +120,19 @@ class Wiring:
 
     pins: dict[str, str]  # {signal, `X.step` or `rs485_rx`: `CONNECTOR PIN`}
     turned: list[str]  # connectors whose buffers were turned into inputs
+    unused: list[str]  # signals of the machine that are not connected on these boards
     between: dict[str, Between]
 
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine file that has been checked by itself."""
+    """A machine file that has been checked by itself: a node with its axes, or a relay."""
 
     name: str
     file: str
     title: str
-    image: str
+    orders: int  # of the relay; 0: the machine is a node
+    image: str  # firmware; a relay has none
     core: str
     memory_kib: int
     address: int  # on the bus, where the board has no switches
@@ -129,8 +142,20 @@ class Machine:
     unused: list[str]  # signals of the node that are not connected
     wiring: dict[str, Wiring]  # by layout
 
+    @property
+    def module(self) -> str:
+        """The module of rtl/ that it is."""
+        return "relay" if self.orders else "node"
+
+    @property
+    def has_flash(self) -> bool:
+        """Whether it reads the flash of the board: firmware, or coefficients of a relay."""
+        return self.core == "serial" or self.orders > 0
+
     def signals(self) -> dict[str, Signal]:
         """{name: signal} of all its signals that are to be connected."""
+        if self.orders:
+            return {n: signal for n, signal in RELAY_SIGNALS.items() if n not in self.unused}
         drives = any(axis.drives for axis in self.axes)
         found = {
             name: signal
@@ -184,6 +209,7 @@ def between_of(table: Table) -> dict[str, Between]:
 def wiring_of(table: Table, between: dict[str, Between]) -> Wiring:
     """The wiring of a layout; its own [between] tables replace those of the machine."""
     turned, own = table.words("turned"), between_of(table.table("between"))
+    unused = table.words("unused")
     pins: dict[str, str] = {}
     for key, value in table.left.items():
         found: dict[str, Any] = (
@@ -195,12 +221,16 @@ def wiring_of(table: Table, between: dict[str, Between]) -> Wiring:
             if not isinstance(pin, str) or len(pin.split()) != 2:
                 raise table.misfit(f'{name}: a pin is written "CONNECTOR PIN", not {pin!r}')
             pins[name] = " ".join(pin.split())
-    return Wiring(pins, turned, between | own)
+    return Wiring(pins, turned, unused, between | own)
 
 
 def check(machine: Machine) -> None:
     """Refuses what contradicts itself, whatever board it is."""
     file, names = machine.file, [axis.name for axis in machine.axes]
+    if machine.orders:
+        if names:
+            raise Misfit(f"{file}: a relay has no [[axis]], but {names[0]} is one")
+        return
     if not 1 <= len(names) <= MOST_AXES:
         raise Misfit(f"{file}: {len(names)} axes; a node has 1 to {MOST_AXES}")
     if twice := [name for name in names if names.count(name) > 1]:
@@ -232,26 +262,34 @@ def names() -> list[str]:
 def load(path: Path) -> Machine:
     """The machine of a machine file."""
     table = read(path)
-    node, between = table.table("node", True), between_of(table.table("between"))
+    title, between = table.take("title", str), between_of(table.table("between"))
     layouts = table.table("wiring")
-    core = node.take("core", str, "soft")
-    if core not in ("soft", "serial"):
-        raise node.misfit(f"core {core!r} is none of soft, serial")
+    if {"node", "relay"} <= set(table.left):
+        raise table.misfit("a machine has [node] or [relay], not both")
+    is_relay = "relay" in table.left
+    kind = table.table("relay" if is_relay else "node", True)
+    orders = kind.take("orders", int) if is_relay else 0
+    if is_relay and not 1 <= orders <= MOST_ORDERS:
+        raise kind.misfit(f"orders {orders} must be 1 to {MOST_ORDERS}")
+    core = "" if is_relay else kind.take("core", str, "soft")
+    if core not in ("", "soft", "serial"):
+        raise kind.misfit(f"core {core!r} is none of soft, serial")
     machine = Machine(
         name=path.stem,
         file=table.file,
-        title=table.take("title", str),
-        image=node.take("image", str),
+        title=title,
+        orders=orders,
+        image="" if is_relay else kind.take("image", str),
         core=core,
-        memory_kib=node.take("memory_kib", int),
-        address=node.take("address", int),
-        filters=node.take("filters", int, 0),
-        segments=node.take("segments", int, 0),
+        memory_kib=0 if is_relay else kind.take("memory_kib", int),
+        address=1 if is_relay else kind.take("address", int),
+        filters=0 if is_relay else kind.take("filters", int, 0),
+        segments=0 if is_relay else kind.take("segments", int, 0),
         axes=[axis_of(row) for row in table.rows("axis")],
-        unused=node.chosen("unused", NODE_SIGNALS),
+        unused=kind.chosen("unused", RELAY_SIGNALS if is_relay else NODE_SIGNALS),
         wiring={layout: wiring_of(layouts.table(layout), between) for layout in list(layouts.left)},
     )
-    for each in (node, table):
+    for each in (kind, table):
         each.close()
     check(machine)
     return machine

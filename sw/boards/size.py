@@ -4,11 +4,12 @@
 from dataclasses import dataclass
 
 from boards.machine import Axis, Machine
+from figures import record
 from firmware.build import stem_of
 
-FLASH = ("flash_cs_n", "flash_sclk", "flash_mosi", "flash_miso")
-# LUT4 of an ECP5 as docs/features.md lists them (make figure NAME=axis_step_lut, axis_sine_lut)
-STEP_AXIS, SINE_AXIS = 1147, 1321
+MEASURED = {name: round(entry.value) for name, entry in record.read().items()}
+# LUT4 of an ECP5; what no figure measures is as docs/features.md lists it
+STEP_AXIS, SINE_AXIS = MEASURED["axis_step_lut"], MEASURED["axis_sine_lut"]
 STEP_NODE, SINE_NODE = 8291, 10583  # of two axes each
 FEATURES = {
     "segments": 1030,
@@ -25,10 +26,11 @@ MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
 SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
-# On an iCE40 (make figure NAME=node_up5k_lc): the node of four axes that count in logic cells, the
-# LUT4 by which netlists of four and three of them differ, and the queue of an axis' captures
-COUNTING_NODE, COUNTING_AXIS = 4657, 562
+# On an iCE40: the node of four axes that count in logic cells, the LUT4 by which netlists of four
+# and three of them differ, and the queue of an axis' captures
+COUNTING_NODE, COUNTING_AXIS = MEASURED["node_up5k_lc"], 562
 ICE40_BLOCK_RAM, ICE40_CAPTURE = 5, 6
+RELAY, RELAY_BLOCK_RAM = MEASURED["relay_up5k_lc"], 5  # of 16 orders, on an iCE40
 TICK, TICK_AXIS = 70, 365  # cycles of the motion engine (docs/engine.md)
 TICK_FILTERS = {0: 0, 2: 115, 4: 219}  # further cycles of an axis with so many biquads
 
@@ -75,6 +77,8 @@ def ecp5_block_ram(machine: Machine) -> int:
 def estimate(family: str, machine: Machine) -> Size:
     """The size of a node for this machine."""
     axes = machine.axes
+    if machine.orders:
+        return Size(RELAY, RELAY_BLOCK_RAM)
     if family == "ice40":
         lut = COUNTING_NODE + (len(axes) - 4) * COUNTING_AXIS
         if machine.core == "soft":
@@ -83,7 +87,10 @@ def estimate(family: str, machine: Machine) -> Size:
         return Size(lut, ICE40_BLOCK_RAM + ICE40_CAPTURE * captures)
     sine = any(axis.has("sine") for axis in axes)
     shared = SINE_NODE - 2 * SINE_AXIS if sine else STEP_NODE - 2 * STEP_AXIS
-    return Size(shared + sum(map(axis_lut, axes)), ecp5_block_ram(machine))
+    block_ram = ecp5_block_ram(machine)
+    if family == "xc7":  # twice as large
+        block_ram = -(-block_ram // 2)
+    return Size(shared + sum(map(axis_lut, axes)), block_ram)
 
 
 def tick_cycles(machine: Machine) -> int:

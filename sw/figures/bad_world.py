@@ -16,6 +16,7 @@ from experiments.s0_fine import HOLD_S, FineStage
 from experiments.s0_stage import ADDRESSES, Stage, random_moves
 from figures.common import Figure, Quick, bar, console
 from figures.fine import POSITIONS_NM, jitter_nm_rms
+from moire.analysis.report import Move
 from moire.client.segments import Segments, SegmentTable
 from twin import WITH_SEGMENTS
 from twin.parameters.tables import world
@@ -71,6 +72,19 @@ def measure_segments(
     return errors
 
 
+def moves_within(stage: Stage, count: int, segments: int, seed: int) -> list[Move]:
+    """So many random moves within the segments, with their progress shown."""
+    with bar("moves") as progress:
+        task = progress.add_task("", total=count)
+        return random_moves(
+            stage,
+            count,
+            seed,
+            done=lambda move: progress.advance(task),
+            high_nm=float(segments * LENGTH_NM),
+        )
+
+
 def s0_coarse_bad_um(
     count: int = 100, segments: int = SEGMENTS, axes: int = len(ADDRESSES), seed: int = SEED
 ) -> float:
@@ -83,15 +97,7 @@ def s0_coarse_bad_um(
             before[name] = measure_segments(stage, name, segments)
             stage.move(name, 0.0)
             progress.advance(task)
-    with bar("moves") as progress:
-        task = progress.add_task("", total=count)
-        moves = random_moves(
-            stage,
-            count,
-            seed,
-            done=lambda move: progress.advance(task),
-            high_nm=float(segments * LENGTH_NM),
-        )
+    moves = moves_within(stage, count, segments, seed)
     errors = np.array([move.error_nm for move in moves])
     console.print(
         "error of the scales before: "
@@ -113,7 +119,7 @@ FINE: dict[str, str | float] = {
     "fine_kd": 6540 / 2**16,
     "fine_reach": "100nm",
     "settle_window": "15nm",  # four times the rms of the floor's vibration at the table
-    "settle_time": "100ms",  # the motor is released meanwhile
+    "settle_time": "100ms",
 }
 FINE_READINGS = 25  # at a border: the floor shakes them
 
@@ -143,15 +149,7 @@ def s0_fine_bad_nm_rms(
 ) -> float:
     stage = fine_stage(segments, calibrated, seed)
     stage.move("X", 0.0)
-    with bar("moves") as progress:
-        task = progress.add_task("", total=count)
-        moves = random_moves(
-            stage,
-            count,
-            seed,
-            done=lambda move: progress.advance(task),
-            high_nm=float(segments * LENGTH_NM),
-        )
+    moves = moves_within(stage, count, segments, seed)
     errors, times = (
         np.array([getattr(move, name) for move in moves]) for name in ("error_nm", "time_s")
     )

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of the server of a bus: what becomes of an axis whose client ends while it moves it."""
 
+import http.client
+import json
 import random
 import signal
 import subprocess
@@ -9,6 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from urllib.parse import urlsplit
 
 from figures.common import Figure, Quick, bar, console
 from moire.bus.gateway import Gateway
@@ -17,9 +20,13 @@ from moire.bus.twin_port import open_twin
 from moire.client.axis import Axis
 from moire.client.bus import Bus
 from moire.client.records import Status
+from moire.web.client import StreamClient
+from moire.web.door import Settings, WebDoor
+from tools import obey_signals
 
 SIGNALS = ("SIGTERM", "SIGHUP", "SIGINT", "SIGKILL")
-WAYS = (*SIGNALS, "closed pipe", "closed socket")
+WAYS = (*SIGNALS, "closed pipe", "closed socket", "closed HTTP", "closed WebSocket")
+MOVE = "/api/nodes/1/axes/0/move"
 CLIENTS = 200
 ENDS_MM = (0, 100)  # the target is the one that is farther away
 MOVES_MM_S = 1  # from this speed on the axis is in mid-motion
@@ -31,21 +38,25 @@ HERE = "37"  # homing method: the zero is where the axis is
 
 @dataclass
 class Server:
-    """A twin of one node behind a Gateway, in a thread of its own."""
+    """A twin of one node behind a Gateway and a WebDoor, each in a thread of its own."""
 
     transport: Transport
     gateway: Gateway = field(init=False)
+    door: WebDoor = field(init=False)
     port: str = field(init=False)
     ending: bool = False
 
     def __post_init__(self) -> None:
         self.gateway = Gateway(self.transport)
         self.port = f"socket://127.0.0.1:{self.gateway.open_tcp('127.0.0.1', 0)}"
+        self.door = WebDoor(self.gateway, Settings())
+        self.door.open()
 
     def run(self) -> None:
         while not self.ending:
             self.gateway.poll(self.gateway.follow_clock())
         self.gateway.close()
+        self.door.close()
 
 
 @contextmanager
@@ -60,12 +71,6 @@ def served() -> Iterator[Server]:
         thread.join()
 
 
-def hear_signals() -> None:
-    """In a new process: a shell lets its background jobs ignore Ctrl-C, which they inherit."""
-    for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
-
-
 @contextmanager
 def client(server: Server, way: str, target_mm: int) -> Iterator[Callable[[], None]]:
     """A client that moves the axis; what it yields ends the client in this way."""
@@ -76,6 +81,17 @@ def client(server: Server, way: str, target_mm: int) -> Iterator[Callable[[], No
             axis.begin_move(mm=target_mm)
             yield port.close
         return
+    body = {"to": f"{target_mm} mm"}
+    if way == "closed HTTP":
+        connection = http.client.HTTPConnection(urlsplit(server.door.url).netloc)
+        connection.request("POST", MOVE, json.dumps(body))
+        yield connection.close
+        return
+    if way == "closed WebSocket":
+        with StreamClient(server.door.url, PATIENCE_S, axes="1.0") as stream:
+            stream.begin("POST", MOVE, body)
+            yield stream.close
+        return
     move = ["move", f"{target_mm}mm"]
     if way == "closed pipe":
         move += ["--no-wait", "--", "watch", "--every", "20ms"]
@@ -84,7 +100,7 @@ def client(server: Server, way: str, target_mm: int) -> Iterator[Callable[[], No
         [*common, *move],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        preexec_fn=hear_signals,
+        preexec_fn=obey_signals,
     ) as process:
         assert process.stdout is not None
         try:

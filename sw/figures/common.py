@@ -19,10 +19,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from campaigns.campaign import seeds as seeds
+from moire.errors import MoireError
 
 HERE = Path(__file__).resolve().parent
 TOOLS = {  # modules here that measure nothing
     "__init__",
+    "browser",
     "common",
     "comparison",
     "figure",
@@ -31,6 +33,12 @@ TOOLS = {  # modules here that measure nothing
 }
 COMPARISONS = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
 console = Console(stderr=True)  # facts and progress; the figure itself goes to standard output
+
+
+class Absent(MoireError):
+    """A program that only this figure needs is not installed. The figure is not measured, which is
+    no failure of a run of all figures.
+    """
 
 
 def within(value: float, bound: str) -> bool:

@@ -17,12 +17,12 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from multiprocessing import get_context
 
 from figures import record
-from figures.common import Figure, collected, console, modules
+from figures.common import Absent, Figure, collected, console, modules
 from figures.comparison import page
 from figures.synthesis import SynthesisError
 from moire.errors import MoireError
@@ -51,6 +51,7 @@ class Outcome:
     took: float
     error: str = ""
     facts: str = ""  # what the figure said beside its value, if it was not shown
+    absent: bool = False  # what it needs is not installed
 
 
 def measure(name: str, figure: Figure, quick: bool, seed: int | None) -> Outcome:
@@ -59,7 +60,8 @@ def measure(name: str, figure: Figure, quick: bool, seed: int | None) -> Outcome
     try:
         value = figure.measured(quick, seed)
     except (MoireError, BuildError, SynthesisError) as error:
-        return Outcome(name, None, time.perf_counter() - began, str(error) or repr(error))
+        took, absent = time.perf_counter() - began, isinstance(error, Absent)
+        return Outcome(name, None, took, str(error) or repr(error), absent=absent)
     except Exception as error:
         console.print_exception()
         return Outcome(name, None, time.perf_counter() - began, repr(error))
@@ -74,7 +76,7 @@ def measure_module(module: str, seed: int | None) -> list[Outcome]:
         console.file = io.StringIO()
         done = measure(name, figure, True, seed)
         facts = console.file.getvalue()
-        outcomes.append(Outcome(name, done.value, done.took, done.error, facts))
+        outcomes.append(replace(done, facts=facts))
     return outcomes
 
 
@@ -99,6 +101,9 @@ def report(outcome: Outcome, figure: Figure, quick: bool) -> bool:
     """Prints the outcome: its meaning to standard error, the value to standard output. Returns
     whether it passes.
     """
+    if outcome.absent:
+        print(f"{outcome.name}: not measured: {outcome.error}", file=sys.stderr, flush=True)
+        return False
     if outcome.value is None:
         console.print(outcome.facts, markup=False, highlight=False)
         print(f"{outcome.name}: {outcome.error}", file=sys.stderr, flush=True)
@@ -174,7 +179,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not quick:
         conclude(outcomes, names, recorded=seed in (None, 1))
     console.print(f"{sum(passed)} of {len(passed)} pass" if len(names) > 1 else "")
-    return 0 if all(passed) else 1
+    failed = [one for one, passes in zip(outcomes, passed) if not passes]
+    return 1 if [one for one in failed if not (one.absent and options.all)] else 0
 
 
 if __name__ == "__main__":

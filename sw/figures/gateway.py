@@ -57,7 +57,7 @@ def rfc2217_reads_per_s(seconds: float = READ_S, start_s: float = START_S) -> fl
     """Positions of a node of the twin, read one after the other by pyserial alone over RFC 2217 in
     8N1.
     """
-    served = "twin --nodes 1 --rfc2217 0 --tcp 0 --json".split()
+    served = "twin --nodes 1 --http 0 --rfc2217 0 --tcp 0 --json".split()
     command = [sys.executable, "-m", "moire", *served]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as twin:
         assert twin.stdout is not None

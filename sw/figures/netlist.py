@@ -78,13 +78,13 @@ def netlist_failures(whole: bool = True, words: str = "") -> float:
     return float(total)
 
 
-def power_up_failures(states: int = POWER_UPS, words: str = "", seed: int = 1) -> float:
+def power_up_failures(states: int = POWER_UPS, tests: str = "tb", seed: int = 1) -> float:
     """Failed tests of the blocks and of a node on RTL whose flip-flops and memories start in random
     states.
     """
     total = 0
     for state in range(seed, seed + states):
-        ran, wrong = failed("tb", words, {"POWER_UP": str(state)})
+        ran, wrong = failed(tests, "", {"POWER_UP": str(state)})
         console.print(f"state {state}: {ran} ran, {wrong} failed")
         total += wrong
     return float(total)
@@ -163,7 +163,9 @@ FIGURES = {
         "failed tests of all blocks and of a node whose flip-flops and memories start in random "
         "states, 3 states",
         "0",
-        Quick({"states": 1, "words": "test_half_duplex"}, "one small block, one state"),
+        Quick(
+            {"states": 1, "tests": "tb/serial/test_half_duplex.py"}, "one small block, one state"
+        ),
         0,
     ),
 }

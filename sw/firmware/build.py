@@ -60,6 +60,7 @@ class Image(NamedTuple):
 
 IMAGES = {
     "axis": Image(usual_axes=1, most_axes=8),
+    "stream": Image(usual_axes=1, most_axes=8),
     "counter": Image(usual_axes=4, most_axes=8, drives=False),
     "steps": Image(usual_axes=8, most_axes=8),
     "station": Image(usual_axes=2, most_axes=2),
@@ -326,7 +327,9 @@ def main() -> None:
         "--image", choices=sorted(IMAGES), default="axis", help="kind of node (default axis)"
     )
     parser.add_argument(
-        "--axes", type=int, help="axes of the node (default axis 1, counter 4, steps 8, station 2)"
+        "--axes",
+        type=int,
+        help="axes of the node (default axis 1, stream 1, counter 4, steps 8, station 2)",
     )
     parser.add_argument(
         "--core", choices=sorted(CORES), default="soft", help="soft core (default soft)"

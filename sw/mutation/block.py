@@ -9,8 +9,6 @@ The register `mutant` in the netlist has the number of the mutant, or 0 for the 
 
 import json
 import re
-import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,13 +120,8 @@ def mutants_of(folder: Path) -> list[CellMutant]:
 
 def yosys(passes: Sequence[str], log: Path) -> None:
     """Run these passes; what Yosys prints goes to a file."""
-    command = [sys.executable, str(ROOT / "tools" / "yosys.py"), "; ".join(passes)]
-    with open(log, "w") as out:
-        done = subprocess.run(command, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT)
-    if done.returncode:
-        lines = log.read_text().splitlines()
-        errors = [line for line in lines if "ERROR" in line] or lines[-1:]
-        raise MutationError(errors[-1] if errors else f"Yosys ended with {done.returncode}")
+    if wrong := netlist.yosys(passes, log):
+        raise MutationError(wrong)
 
 
 def with_parameters(text: str, top: str, values: dict[str, str]) -> str:

@@ -25,7 +25,7 @@ from pathlib import Path
 
 from mutation import equivalence
 from mutation.block import BUILD, CellMutant, MutationError, Run, mutants_of
-from twin.build import ROOT
+from twin.build import ROOT, rtl_path
 
 MUTANTS = 1000  # of a block
 REASONS = Path(__file__).with_name("blocks.toml")
@@ -197,7 +197,6 @@ def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
     """The verdicts of the runs of a block."""
     verdicts, met = Verdicts(), dict[Reason, bool]()  # whether it is needed
     source = next((ROOT / "rtl").rglob(f"{block}.sv"))
-    folders = sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")})
     results = results_of(block, runs)
     parameters = {run.folder: run.parameters for run, _ in runs}
     for folder, build in results.items():
@@ -215,7 +214,7 @@ def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
                 unseen[mutant] = reason
         if not unseen:
             continue
-        ports = equivalence.pair(path, source, parameters[folder], folders)
+        ports = equivalence.pair(path, source, parameters[folder], rtl_path())
         compared = equivalence.compared(path, ports, [mutant.number for mutant in unseen])
         for mutant, reason in unseen.items():
             verdict, how = compared[mutant.number]

@@ -137,6 +137,20 @@ def digest(family: str, source: Path, parameters: Parameters, folders: Sequence[
     return total.hexdigest()[:16]
 
 
+def yosys(passes: Sequence[str], log: Path) -> str:
+    """Runs these passes; what Yosys prints goes to a file. Returns the line that says what is
+    wrong, nothing if all is well.
+    """
+    command = [sys.executable, str(ROOT / "tools" / "yosys.py"), "; ".join(passes)]
+    with open(log, "w") as out:
+        done = subprocess.run(command, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT)
+    if not done.returncode:
+        return ""
+    lines = log.read_text().splitlines()
+    errors = [line for line in lines if "ERROR" in line] or lines[-1:]
+    return errors[-1] if errors else "no word"
+
+
 def value_of(bits: str) -> str:
     """A parameter's value in Yosys's JSON, as Verilog."""
     if re.fullmatch(r"[01xz]+", bits):
@@ -178,13 +192,8 @@ def synthesise(
         f"check -assert; rename {top} {top}{SUFFIX}",
         f"write_verilog -noattr {out}/netlist.v",
     ]
-    command = [sys.executable, str(ROOT / "tools" / "yosys.py"), "; ".join(passes)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    (out / "synthesis.log").write_text(done.stdout + done.stderr)
-    if done.returncode:
-        lines = (done.stdout + done.stderr).splitlines()
-        errors = [line for line in lines if "ERROR" in line] or lines[-1:]
-        raise NetlistError(f"synth_{family} of {top}: {errors[-1] if errors else 'no word'}")
+    if wrong := yosys(passes, out / "synthesis.log"):
+        raise NetlistError(f"synth_{family} of {top}: {wrong}")
     module = json.loads((out / "interface.json").read_text())["modules"][top]
     (out / "wrapper.v").write_text(wrapper(top, module))
     (out / "primitives.v").write_text(primitives(family))

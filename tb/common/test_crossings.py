@@ -87,7 +87,7 @@ def test_a_pin_of_a_board_that_goes_to_a_port_of_another_kind_is_found(port, com
         f"node u_node (.clk, .rst, .{port}(level), .rs485_tx(q));\nendmodule\n"
     )
     comments = crossings.inputs_of(crossings.designs()["node"])
-    assert len(list(crossings.wrong_pins(top, comments))) == count
+    assert len(list(crossings.wrong_pins(top, "", comments))) == count
 
 
 def test_each_input_of_each_design_has_one_rate():

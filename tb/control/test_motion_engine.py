@@ -638,7 +638,7 @@ async def random_ticks(engine, ticks, realistic):
 
 def ticks_of(engine):
     """As many as the environment says, else fewer for more axes: each takes its own time."""
-    return int(os.environ.get("TICKS", min(120, 150 // engine.axes)))
+    return int(os.environ.get("TICKS", min(80, 100 // engine.axes)))
 
 
 @cocotb.test()

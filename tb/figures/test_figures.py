@@ -11,7 +11,7 @@ import pytest
 
 from figures import figure as command
 from figures import record, synthesis
-from figures.common import Figure, Quick, collected, seeds, shares, within
+from figures.common import Absent, Figure, Quick, collected, seeds, shares, within
 from tables import readme_figures
 
 
@@ -91,6 +91,30 @@ def test_the_command_judges_records_and_passes_the_seed_on(monkeypatch, tmp_path
         command.main(["fixed", "--seed", "2"])
     before = path.read_text()
     assert command.main(["small", "--seed", "2"]) == 1 and path.read_text() == before
+
+
+def needs_what_is_absent():
+    raise Absent("Chromium is not installed: make chromium")
+
+
+def test_a_figure_whose_program_is_absent_is_not_measured_and_does_not_fail_all_figures(
+    monkeypatch, tmp_path, capsys
+):
+    figures = {
+        "drawn": Figure(needs_what_is_absent, "ms", "a picture", "< 5", Quick()),
+        "fixed": Figure(lambda: 2.0, "nm", "a fixed one", "2", Quick(), 1),
+    }
+    path = tmp_path / "figures.toml"
+    monkeypatch.setattr(command, "collected", lambda attribute: figures)
+    monkeypatch.setattr(command, "PAGE", tmp_path / "figures.html")
+    monkeypatch.setattr(record.add, "__defaults__", (path,))
+    assert command.main(["drawn"]) == 1
+    assert "drawn: not measured: Chromium is not installed" in capsys.readouterr().err
+    assert command.main(["--all"]) == 0
+    assert capsys.readouterr().out == "fixed 2.0 nm\n" and set(record.read(path)) == {"fixed"}
+    assert "make chromium" in command.PAGE.read_text()
+    figures["fixed"] = Figure(lambda: 3.0, "nm", "a fixed one", "2", Quick(), 1)
+    assert command.main(["--all"]) == 1
 
 
 def test_the_record_holds_figures_of_today_with_their_units_and_bounds():

@@ -136,6 +136,30 @@ def test_the_motor_makes_the_move_and_the_fine_stage_settles_it():
     assert axis.loop == FINE
 
 
+@pytest.mark.parametrize("command", (800, -800))
+def test_a_move_ends_when_the_motor_is_released(command):
+    machine, axis = holding(settle_window=10, settle_time=5)
+    axis.seized = False
+    machine.ask("move", axis=0, target=200 * PERIOD)
+    assert machine.run(5000, until=lambda: machine.status()["state"] == "settling")
+    axis.stand(0)
+    axis.word[COMMAND] = command & 0xFFFF  # what holds the screw wound up
+    assert machine.run(5000, until=lambda: axis.loop == FINE)
+    assert machine.run(5000, until=lambda: axis.open_command == 0)
+    assert machine.status()["state"] == "settling"
+    assert finish(machine) == "ok"
+
+
+def test_a_move_whose_fine_stage_does_not_return_to_its_middle_fails():
+    machine, axis = holding(settle_window=10, settle_timeout=300)
+    axis.seized = False
+    machine.ask("move", axis=0, target=200 * PERIOD)
+    assert machine.run(5000, until=lambda: machine.status()["state"] == "settling")
+    axis.stand(0)
+    machine.actuators[0][FINE_COMMAND] = 1
+    assert finish(machine) == "not_settled"
+
+
 def test_homing_ends_within_the_reach():
     machine, axis = holding(settle_window=1)
     axis.seized = False

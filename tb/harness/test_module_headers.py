@@ -104,6 +104,8 @@ STAND_ALONE = {  # instantiated by no other module, and the reason why they exis
     "node": "a product",
     "relay": "a product",
     "encoder_counter": "a product: a counter on the bus of another design",
+    "wishbone_port": "a product: the registers on the bus of another design",
+    "axi_lite_port": "a product: the registers on the bus of another design",
     "arctan_pipelined": "the arctan without multipliers; narrow samples are correctly rounded",
     "arctan_iterative": "the small alternative to arctan_pipelined",
     "arctan_table": "the method of S0",

@@ -9,7 +9,8 @@ import pytest
 
 from mutation import block, blocks, equivalence
 from mutation.block import Run, mutant_of, mutants_of
-from tb.bench import ROOT, of_mutants, search_path, source_of
+from tb.bench import ROOT, of_mutants, source_of
+from twin.build import rtl_path
 
 LINE = (
     r"mutate -ctrl mutant 4 9 -mode cnot1 -module permission -cell $procdff$24 -port Q -portbit 3 "
@@ -30,7 +31,7 @@ def test_a_mutant_has_the_place_and_the_name_of_its_fault():
 @pytest.fixture(scope="module")
 def divider():
     """The folder of the mutants of a small block."""
-    return block.prepared(source_of("tick_divider"), {"W": 8}, search_path(), 20, 1)
+    return block.prepared(source_of("tick_divider"), {"W": 8}, rtl_path(), 20, 1)
 
 
 def test_the_netlist_has_the_parameters_of_the_block_and_a_register_that_selects(divider):
@@ -43,7 +44,7 @@ def test_a_mutant_of_no_consequence_is_equivalent_and_another_one_is_not(divider
     """Bit 7 of the constant 1 that a reset writes is 0 already. The first mutant inverts a bit of
     the count.
     """
-    ports = equivalence.pair(divider, source_of("tick_divider"), {"W": 8}, search_path())
+    ports = equivalence.pair(divider, source_of("tick_divider"), {"W": 8}, rtl_path())
     mutants = {mutant.number: mutant for mutant in mutants_of(divider)}
     idle = next(n for n, m in mutants.items() if m.name == "procmux.B bit 7 tied to 0")
     active = next(n for n, m in mutants.items() if m.name == "procdff.Q bit 0 (elapsed) inverted")

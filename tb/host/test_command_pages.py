@@ -4,21 +4,23 @@ page is valid.
 """
 
 import re
+import runpy
 import shlex
 from pathlib import Path
 
 import pytest
 
 from moire.cli import command_line
-from moire.cli.parser import SECTIONS
+from moire.cli.commands import MODULES
 from tables import commands as generator
 
 ROOT = Path(__file__).resolve().parents[2]
+COMMANDS = ROOT / "sw" / "host" / "moire" / "cli" / "commands"
 
 
 def test_the_made_pages_are_fresh_and_there_is_one_for_each_command():
     assert generator.main(["--check"]) == 0
-    names = set(command_line.moire.commands)
+    names = set(MODULES)
     assert {path.stem for path in generator.PAGES.glob("*.md")} == names | {"README"}
     assert names >= {
         "find",
@@ -57,7 +59,7 @@ def test_a_stale_page_and_one_of_no_command_are_found_and_put_right(tmp_path, mo
 
 
 def test_every_argument_of_every_command_is_on_its_page():
-    for name, command in command_line.moire.commands.items():
+    for name, command in generator.below(command_line.moire).items():
         text = (generator.PAGES / f"{name}.md").read_text()
         for part in [command, *generator.below(command).values()]:
             assert part.help in text and f"    {part.example}\n" in text
@@ -66,11 +68,11 @@ def test_every_argument_of_every_command_is_on_its_page():
     move = (generator.PAGES / "move.md").read_text()
     assert "| `LENGTH` | " in move and "| `[--by]` | " in move
     assert "| `[--nodes N …]` | " in (generator.PAGES / "twin.md").read_text()
-    assert "| `--bandwidth FREQUENCY` | " in (generator.PAGES / "tune.md").read_text()
+    assert "| `--counts N` | " in (generator.PAGES / "relay.md").read_text()
 
 
 def every_command():
-    for command in command_line.moire.commands.values():
+    for command in generator.below(command_line.moire).values():
         yield from [command, *generator.below(command).values()]
 
 
@@ -81,9 +83,17 @@ def test_every_help_text_is_a_full_sentence():
             assert text.endswith("."), text
 
 
-def test_the_sections_of_the_help_name_every_command_once():
-    names = [name for names in SECTIONS.values() for name in names]
-    assert sorted(names) == sorted(command_line.moire.commands)
+@pytest.mark.parametrize("module", sorted(set(MODULES.values())))
+def test_a_module_makes_the_commands_that_the_help_says(module, monkeypatch):
+    monkeypatch.setattr(command_line.moire, "commands", {})
+    runpy.run_path(str(COMMANDS / f"{module}.py"))
+    assert set(command_line.moire.commands) == {
+        name for name, made_by in MODULES.items() if made_by == module
+    }
+
+
+def test_every_module_of_commands_is_in_the_help():
+    assert {path.stem for path in COMMANDS.glob("*.py")} == set(MODULES.values()) | {"__init__"}
 
 
 def written_commands():

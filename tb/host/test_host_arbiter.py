@@ -7,10 +7,10 @@ import pytest
 
 from moire.bus.arbiter import Arbiter
 from moire.bus.gateway import Gateway
-from moire.bus.protocol import parse_reply, request_body
+from moire.bus.protocol import IN_MOTION, parse_reply, request_body
 from moire.client.names import CAUSE_CODES
 from moire.client.node import register_fields
-from moire.made.bus_tables import CAUSES
+from moire.made.bus_tables import CAUSES, PARAMETERS
 from tb.fakes.bus_node import PERIOD, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 
@@ -172,6 +172,21 @@ def test_a_drive_that_another_client_now_needs_stays_on_until_that_one_has_gone(
     clients.arbiter.depart("B")
     clients.pass_time(1)
     assert node.state() == "off" and node.ended() == "stopped"
+
+
+def test_an_axis_whose_node_does_not_answer_at_once_is_stopped_when_it_does(clients, node):
+    velocity = PARAMETERS["velocity"]
+    slow = velocity.default // 10
+    assert clients.ask("A", "set_parameter", axis=0, parameter=velocity.id, value=slow) == "ok"
+    begin_to_move(clients, "A")
+    clients.far.from_nodes = lambda word: []
+    clients.arbiter.depart("A")
+    clients.arbiter.see_off()
+    assert clients.arbiter.farewells and node.state() in IN_MOTION
+    clients.far.from_nodes = lambda word: [word]
+    clients.pass_time(1)
+    assert node.ended() == "stopped" and node.state() == "off"
+    assert not clients.arbiter.farewells
 
 
 def test_a_node_without_power_ends_the_care_for_its_axes(clients, node):

@@ -315,6 +315,25 @@ def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
     call = Call(["tune", str(record), "--bandwidth", "40Hz", "--tick", "250us", "--write"], node)
     assert call.code == 0 and "written to node 1 axis 0" in call.out
     assert node.parameter("kp") == round(result["gains"]["kp"] * 65536) > 0
+    written = node.parameters()
+    call = Call(["tune", str(record), "--check", "--json"], node)
+    assert call.code == 0 and call.results[0]["bandwidth_hz"] == pytest.approx(40, rel=0.05)
+    node.force("kp", 100 * written["kp"])
+    refused = sentence(Call(["tune", str(record), "--check"], node), 1)
+    assert "has a phase margin of 6 degrees" in refused and "set kp to 1." in refused
+    assert node.parameters() == {**written, "kp": 100 * written["kp"]}, "a check changes nothing"
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ("", "--bandwidth is missing"),
+        ("--check --bandwidth 40Hz", "--check and --bandwidth do not go together"),
+        ("--check --write", "--check and --write do not go together"),
+    ],
+)
+def test_tune_needs_either_a_bandwidth_or_a_check(options, message):
+    assert message in sentence(Call(f"tune record.csv {options}"), 2)
 
 
 @pytest.mark.parametrize(
@@ -547,7 +566,7 @@ def test_ports_are_exit_code_4(monkeypatch):
 
 
 def test_without_a_checkout_the_port_twin_reports_what_to_do(monkeypatch):
-    monkeypatch.setattr("moire.bus.twin_port.entry_points", lambda **_: ())
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: ())
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
     assert err.getvalue() == (

@@ -19,7 +19,6 @@ import pytest
 import serial
 import serial.rfc2217
 
-from figures.clients import hear_signals
 from moire.bus import cobs
 from moire.bus.gateway import Gateway, PacketClient
 from moire.bus.protocol import frame, request_body
@@ -31,44 +30,28 @@ from moire.made.registers import MAP_CRC
 from tb.bench import seed
 from tb.fakes.bus_node import START, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
+from tb.fakes.served import HANG_S, ServedBus
+from tb.fakes.served import homed as homed_node
+from tools import obey_signals
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
 )  # in pyserial
 SEED = seed()
-HANG_S = 60  # of the clock: a word that has not arrived by then never will
 
 
-class Served:
+class Served(ServedBus):
     """A gateway in a thread, with all three entrances open."""
 
     def __init__(self, *nodes):
-        self.far = Rs485Bus(*(nodes or [BusNode()]))
-        self.gateway = Gateway(self.far)
+        super().__init__(*(nodes or [BusNode()]))
         host = "127.0.0.1"
         self.ports = {
             "rfc2217": f"rfc2217://{host}:{self.gateway.open_rfc2217(host, 0)}",
             "tcp": f"socket://{host}:{self.gateway.open_tcp(host, 0)}",
             "terminal": self.gateway.open_pty(),
         }
-        self.ending, self.looked = False, threading.Condition()
-        self.thread = threading.Thread(target=self.run)
-        self.thread.start()
-
-    def run(self):
-        while not self.ending:
-            self.gateway.poll(self.gateway.follow_clock())
-            with self.looked:
-                self.looked.notify_all()
-        self.gateway.close()
-
-    def wait_until(self, true):
-        with self.looked:
-            assert self.looked.wait_for(true, HANG_S), "waited in vain"
-
-    def end(self):
-        self.ending = True
-        self.thread.join()
+        self.begin()
 
 
 @pytest.fixture
@@ -84,12 +67,6 @@ def homed():
     made = Served(homed_node())
     yield made
     made.end()
-
-
-def homed_node():
-    node = BusNode()
-    node.home()
-    return node
 
 
 def opened(served, entrance, parity="auto"):
@@ -263,6 +240,29 @@ def test_no_answer_is_reported_through_packets_too(served):
             Bus(port, tries=2).node(5)
 
 
+@pytest.mark.parametrize("entrance, parity", [("tcp", "auto"), ("rfc2217", "none")])
+def test_status_says_how_fast_a_simulated_machine_runs(served, entrance, parity, monkeypatch):
+    monkeypatch.setattr(served.gateway, "measure_speed", lambda: None)
+    out = io.StringIO()
+    for speed, words in (
+        (None, None),
+        (0.3256, "0.33 simulated seconds per second"),
+        (1e9, "4294967.29 simulated"),
+    ):
+        served.gateway.speed = speed
+        call = ["--port", served.ports[entrance], "--parity", parity, "status"]
+        assert command_line.main([*call, "--patience", f"{HANG_S}s"], None, out, out) == 0
+        assert words is None and "simulated" not in out.getvalue() or words in out.getvalue()
+    assert served.gateway.refused == 0
+
+
+def test_a_server_that_is_too_old_to_say_its_speed_is_no_error(served, monkeypatch):
+    monkeypatch.setattr("moire.bus.gateway.speed_reply", lambda *_: None)
+    with opened(served, "tcp") as port:
+        assert port.speed() is None
+        assert patient(port).axis().status().state == "off"
+
+
 def test_a_client_that_disconnects_is_forgotten(served):
     for _ in range(3):
         with opened(served, "tcp") as port:
@@ -301,6 +301,21 @@ def test_a_process_leaves_a_drive_on_that_another_one_has_switched_on(homed):
         assert axis.status().state == "holding" and node.written("enable") == [{"axis": 0, "on": 1}]
 
 
+def test_a_command_takes_an_axis_over_that_another_client_moves(homed):
+    node = homed.far.nodes[0]
+    with opened(homed, "tcp") as port:
+        axis = patient(port).axis()
+        axis.enable()
+        axis.begin_move("100mm")
+        assert "another client moves this axis" in complaint(
+            f"--port {homed.ports['tcp']} move 0mm", 1
+        )
+        call = f"--port {homed.ports['tcp']} --patience {HANG_S}s move 1um --by --take"
+        out = io.StringIO()
+        assert command_line.main(call.split(), None, out, out) == 0, out.getvalue()
+        assert node.executed.count("move") == 2 and node.executed.count("stop") == 1
+
+
 def test_stopping_goes_ahead_of_all_requests_that_wait():
     far = Rs485Bus(BusNode())
     gateway, answers = Gateway(far), []
@@ -332,7 +347,7 @@ def started(served, *words):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=hear_signals,
+        preexec_fn=obey_signals,
     ) as process:
         try:
             yield process
@@ -435,7 +450,8 @@ def test_ctrl_c_ends_a_served_twin_without_an_error(monkeypatch):
     monkeypatch.setattr(Gateway, "follow_clock", interrupt)
     err = io.StringIO()
     assert (
-        command_line.main(["twin", "--rfc2217", "0", "--tcp", "0"], None, io.StringIO(), err) == 0
+        command_line.main("twin --http 0 --rfc2217 0 --tcp 0".split(), None, io.StringIO(), err)
+        == 0
         and err.getvalue() == ""
     )
 
@@ -448,6 +464,8 @@ def test_the_ports_are_printed_as_json(monkeypatch, tmp_path):
         "--nodes",
         "3",
         "4",
+        "--http",
+        "0",
         "--rfc2217",
         "0",
         "--tcp",
@@ -464,5 +482,6 @@ def test_the_ports_are_printed_as_json(monkeypatch, tmp_path):
         reported["machine"] == "s0"
         and reported["nodes"] == [3, 4]
         and reported["rfc2217"].startswith("rfc2217://127.0.0.1:")
+        and reported["http"].startswith("http://127.0.0.1:")
         and not link.exists()
     )

@@ -90,3 +90,13 @@ def test_every_module_of_the_command_line_is_in_the_wheel(installed):
     ended = installed("python", "-c", program)
     assert ended.returncode == 0, ended.stderr
     assert len(names) > 20
+
+
+def test_the_files_of_the_live_page_are_in_the_wheel(installed):
+    folder = HOST / "moire" / "web" / "static"
+    program = (
+        "from importlib.resources import files; "
+        "print(sorted(one.name for one in files('moire.web').joinpath('static').iterdir()))"
+    )
+    ended = installed("python", "-c", program)
+    assert ended.stdout == f"{sorted(one.name for one in folder.iterdir())}\n", ended.stderr

@@ -214,7 +214,7 @@ def test_fault_reports_cause_position_and_what_to_do():
         )
         and "signal too small" in out
     )
-    assert "remove the cause, then 'moire reset', then 'moire home'" in out
+    assert "release the emergency stop; then 'moire reset', then 'moire home'" in out
     assert Call("fault --json", node).results[0]["first_fault"] == ["estop"]
 
 

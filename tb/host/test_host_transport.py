@@ -3,9 +3,12 @@
 
 import errno
 import os
+import socket
+from types import SimpleNamespace
 
 import pytest
 import serial
+from serial.urlhandler import protocol_socket
 
 from moire.bus import transport
 from moire.bus.protocol import ODD_ADDRESSES
@@ -222,6 +225,36 @@ def test_a_port_in_use_is_reported_with_the_real_library_too():
     os.close(far)
 
 
+def test_a_connection_by_tcp_closes_without_a_pause(monkeypatch):
+    clock = SimpleNamespace(sleep=lambda seconds: pytest.fail("it waits"))
+    monkeypatch.setattr(protocol_socket, "time", clock)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        bus = transport.open_bus(f"socket://127.0.0.1:{server.getsockname()[1]}")
+        other, _ = server.accept()
+        with other:
+            bus.close()
+            assert other.recv(1) == b"", "the server sees the end"
+        bus.close()
+
+
+def test_a_connection_that_the_server_has_ended_closes_too():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        bus = transport.open_bus(f"socket://127.0.0.1:{server.getsockname()[1]}")
+        other, _ = server.accept()
+        bus.port.write(b"unread")
+        other.close()  # with what is unread, so that the connection is reset
+        with pytest.raises(serial.SerialException):
+            while True:
+                bus.port.read(1)
+        bus.close()
+
+
+@pytest.mark.parametrize("port", ["socket://127.0.0.1:70000", "socket://127.0.0.1"])
+def test_a_wrong_address_of_a_tcp_port_is_refused(port):
+    with pytest.raises(PortError, match="socket"):
+        transport.open_bus(port)
+
+
 def test_receive_ends_when_its_time_has_passed():
     bus, _ = serial_bus()
     began = bus.now()
@@ -277,7 +310,7 @@ def test_open_bus_opens_a_simulated_machine_by_name(monkeypatch):
         assert which == {"group": "moire.ports", "name": "twin"}
         return [EntryPoint]
 
-    monkeypatch.setattr("moire.bus.twin_port.entry_points", entry_points)
+    monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
     for port, machine in (("twin", "s0"), ("twin:s2", "s2"), ("twin:", "s0")):
         with transport.open_bus(port, baud=9600) as bus:
             assert bus.baud == 9600 and opened.pop() == machine

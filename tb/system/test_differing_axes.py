@@ -56,9 +56,12 @@ def test_each_axis_reports_what_it_was_built_with(axes):
 
 def test_both_drives_home_and_move_in_one_node(axes):
     stepper, servo = axes[STEPPER], axes[SERVO]
-    for axis, target in ((stepper, "2mm"), (servo, "50um")):
+    for axis in (stepper, servo):
         axis.enable()
-        assert axis.home().homed, "the index is captured without a queue"
+        axis.request("home")
+    for axis in (stepper, servo):
+        assert axis.wait().homed, "the index is captured without a queue"
+    for axis, target in ((stepper, "2mm"), (servo, "50um")):
         ended = axis.move(target)
         assert ended.ended == "ok" and abs(ended.target_nm - ended.position_nm) < 1000
     axes[COUNTER].status()

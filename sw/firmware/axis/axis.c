@@ -40,6 +40,8 @@ static struct axis {
     uint32_t eased_ms;  // time of the last decrease of the motor command
 } axes[HARDWARE_AXES];
 
+static uint8_t stop_causes[HARDWARE_AXES];  // bus_cause with which a controlled stop ends
+
 static bool is_busy(const struct axis* a) { return a->ended == BUS_CAUSE_RUNNING; }
 
 static bool pressed(uint32_t state) {
@@ -67,30 +69,34 @@ static void hand_over(unsigned n, bool fine) {
 
 // A motor whose command drops to 0 springs back. So its command decreases slowly enough for the
 // fine stage to follow, until friction alone holds the axis. A stepper keeps its command.
-static void ease(unsigned n) {
+bool axis_ease(unsigned n) {
     struct axis* a = &axes[n];
     uint32_t now = clock_ms();
     int32_t command = (int16_t)axis_read(n, AXIS_OPEN_COMMAND),
             most = EASE * (int32_t)(now - a->eased_ms);
     a->eased_ms = now;
-    if (parameters_get(n, BUS_PARAMETER_DRIVE) == STEPS) return;
+    if (parameters_get(n, BUS_PARAMETER_DRIVE) == STEPS) return true;
     axis_write(n, AXIS_OPEN_COMMAND,
                (uint32_t)(command > most    ? command - most
                           : command < -most ? command + most
                                             : 0));
+    return command == 0;
 }
 
-static void hold(unsigned n) {
+// Whether the axis is held for good: the fine stage holds it and the motor is released, or the
+// error is out of its reach.
+static bool hold(unsigned n) {
     struct axis* a = &axes[n];
     int64_t reach = parameters_get(n, BUS_PARAMETER_FINE_REACH),
             limit = parameters_get(n, BUS_PARAMETER_FINE_LIMIT);
     int16_t command = (int16_t)actuator_read(n, ACTUATOR_FINE_COMMAND);
-    bool able = limit && (a->fine ? command < limit && command > -limit : command == 0);
-    bool near = reach && able && motion_inside(n, a->fine ? FINE_HYSTERESIS * reach : reach);
+    bool able = a->fine ? command < limit && command > -limit : command == 0;
+    bool inside = reach && limit && motion_inside(n, a->fine ? FINE_HYSTERESIS * reach : reach);
+    bool near = inside && able;
     if (near && !a->near) a->near_ms = clock_ms();
     a->near = near;
     if (!near || a->fine || clock_ms() - a->near_ms >= FINE_MS) hand_over(n, near);
-    if (a->fine) ease(n);
+    return a->fine ? axis_ease(n) : !inside;
 }
 
 static void finish(unsigned n, uint8_t cause) {
@@ -140,14 +146,13 @@ void axis_poll(unsigned n) {
     case BUS_STATE_PREPARED:
     case BUS_STATE_HOLDING: hold(n); break;
     case BUS_STATE_SETTLING:
-        hold(n);
-        outcome = motion_settle(n, parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW));
+        outcome = motion_settle(n, hold(n), parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW));
         // plans are exact: another end means that a bit flipped, in the plan or on its way
         if (outcome == BUS_CAUSE_OK && !motion_complete(n)) outcome = BUS_CAUSE_NOT_SETTLED;
         if (outcome != BUS_CAUSE_RUNNING) finish(n, outcome);
         break;
     case BUS_STATE_STOPPING:
-        if (motion_played(n)) finish(n, BUS_CAUSE_STOPPED);
+        if (motion_played(n)) finish(n, stop_causes[n]);
         break;
     default: break;
     }
@@ -301,14 +306,19 @@ uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id) {
     return BUS_CAUSE_OK;
 }
 
+void axis_break_off(unsigned n, uint8_t cause) {
+    motion_controlled_stop(n);
+    axes[n].state = BUS_STATE_STOPPING;
+    stop_causes[n] = cause;
+}
+
 uint8_t axis_stop(unsigned n) {
     struct axis* a = &axes[n];
     a->command_count++;
     axis_poll(n);
     if (!is_busy(a) || a->state == BUS_STATE_STOPPING) return BUS_CAUSE_OK;
     if (axis_read(n, AXIS_STATE) & AXIS_STATE_MOVING_MASK) {
-        motion_controlled_stop(n);
-        a->state = BUS_STATE_STOPPING;
+        axis_break_off(n, BUS_CAUSE_STOPPED);
     } else {
         if (a->state == BUS_STATE_PREPARED || a->state == BUS_STATE_EXCITED)
             motion_set_target_to_position(n);
@@ -330,6 +340,7 @@ uint8_t axis_excite(unsigned n, bool on) {
     if (cause != BUS_CAUSE_OK) return cause;
     hand_over(n, false);
     axis_write(n, AXIS_OPEN_COMMAND, axis_read(n, AXIS_COMMAND));
+    a->eased_ms = clock_ms();
     a->ended = BUS_CAUSE_RUNNING;
     a->state = BUS_STATE_EXCITED;
     write_control(n, true);

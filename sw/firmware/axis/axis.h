@@ -37,9 +37,12 @@ uint8_t axis_may_start(unsigned count, uint32_t mask);  // the check alone
 void axis_started(unsigned count, uint32_t mask);       // the hardware has started them
 
 uint8_t axis_stop(unsigned n);  // controlled stop; always ok
+// Begins a controlled stop of a motion in progress, which then ends with this cause.
+void axis_break_off(unsigned n, uint8_t cause);
 
 // Open loop on or off: while it is on, the caller writes the register open_command.
 uint8_t axis_excite(unsigned n, bool on);
+bool axis_ease(unsigned n);  // meanwhile: open_command slowly becomes 0; true when it is
 
 // Returns fault_persists while the cause of a latched fault is present.
 uint8_t axis_reset_faults(unsigned n);

@@ -264,7 +264,7 @@ uint8_t homing_poll(unsigned n, uint32_t state) {
                      BUS_PARAMETER_HOMING_SEARCH_SPEED);
     case RETURN: return motion_played(n) ? seek(n, true, distance / 4) : BUS_CAUSE_RUNNING;
     case FIRST_SETTLE:
-        caught = motion_settle(n, settle_window(n));
+        caught = motion_settle(n, true, settle_window(n));
         if (caught != BUS_CAUSE_OK) return caught;
         zero(n);
         if (method_of(n) == 17 || method_of(n) == 18) return BUS_CAUSE_OK;
@@ -273,7 +273,7 @@ uint8_t homing_poll(unsigned n, uint32_t state) {
                          axis_read_position(n, AXIS_TARGET),
                      BUS_PARAMETER_HOMING_LATCH_SPEED);
     case ZERO: return motion_played(n) ? go(n, SECOND_SETTLE) : BUS_CAUSE_RUNNING;
-    default: return motion_settle(n, settle_window(n));
+    default: return motion_settle(n, true, settle_window(n));
     }
 }
 

@@ -39,6 +39,8 @@ static struct {
     bool ready;     // it has been planned
 } next;
 
+static void (*stream_feed)(unsigned n);  // null without a stream in this image
+
 static bool joins(unsigned n) { return next.join && next.axis == n; }
 
 static void discard_plan(unsigned n) {
@@ -62,7 +64,17 @@ static uint32_t ticks_of(uint32_t kilocycles) {
 
 static bool at_join(unsigned n) { return joins(n) && motions[n].plan.at.tick == next.join; }
 
-// Queues one piece; the queue must have room. Returns its ticks, or 0 when nothing is left.
+static void queue(unsigned n, const struct planner_segment* piece, bool last) {
+    struct motion* m = &motions[n];
+    m->queued[m->pieces++ % QUEUE] = (uint8_t)piece->ticks;
+    axis_write_wide(n, AXIS_SEGMENT_VELOCITY, (uint64_t)piece->velocity);
+    axis_write_wide(n, AXIS_SEGMENT_ACCELERATION, (uint64_t)piece->acceleration);
+    axis_write(n, AXIS_SEGMENT_JERK, (uint32_t)piece->jerk);
+    axis_write(n, AXIS_SEGMENT_TICKS, piece->ticks | (last ? AXIS_SEGMENT_TICKS_LAST_MASK : 0));
+}
+
+// Queues the next piece of the plan; the queue must have room. Returns its ticks, or 0 when nothing
+// is left.
 static uint32_t push(unsigned n) {
     struct motion* m = &motions[n];
     struct planner_segment piece;
@@ -74,21 +86,40 @@ static uint32_t push(unsigned n) {
     }
     if (joins(n) && next.join - m->plan.at.tick < longest) longest = next.join - m->plan.at.tick;
     if (!planner_take_up_to(&m->plan, &piece, &last, longest)) return 0;
-    m->queued[m->pieces++ % QUEUE] = (uint8_t)piece.ticks;
-    axis_write_wide(n, AXIS_SEGMENT_VELOCITY, (uint64_t)piece.velocity);
-    axis_write_wide(n, AXIS_SEGMENT_ACCELERATION, (uint64_t)piece.acceleration);
-    axis_write(n, AXIS_SEGMENT_JERK, (uint32_t)piece.jerk);
-    axis_write(n, AXIS_SEGMENT_TICKS, piece.ticks | (last ? AXIS_SEGMENT_TICKS_LAST_MASK : 0));
+    queue(n, &piece, last);
     return piece.ticks;
+}
+
+uint32_t motion_room(unsigned n) {
+    return FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE);
+}
+
+static uint32_t queued_ticks(const struct motion* m, uint32_t pieces) {
+    uint32_t ticks = 0;
+    for (uint32_t piece_back = 1; piece_back <= pieces; piece_back++)
+        ticks += m->queued[(m->pieces - piece_back) % QUEUE];
+    return ticks;
+}
+
+uint32_t motion_queued(unsigned n) { return queued_ticks(&motions[n], QUEUE - motion_room(n)); }
+
+uint32_t motion_busy_ticks(void) { return ticks_of(BUSY_KILOCYCLES); }
+
+void motion_set_stream(void (*feed)(unsigned n)) { stream_feed = feed; }
+
+void motion_stream(unsigned n, const struct planner_segment* piece, bool last, int64_t to) {
+    motions[n].to = to;
+    queue(n, piece, last);
 }
 
 void motion_feed(unsigned n) {
     struct motion* m = &motions[n];
-    if (m->plan.next >= m->plan.count) return;
-    uint32_t pieces = QUEUE - FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), ticks = 0;
-    uint32_t most = PLANNER_TICK_HZ / 1000u * QUEUED_MS + ticks_of(BUSY_KILOCYCLES);
-    for (uint32_t piece_back = 1; piece_back <= pieces; piece_back++)
-        ticks += m->queued[(m->pieces - piece_back) % QUEUE];
+    if (m->plan.next >= m->plan.count) {
+        if (stream_feed) stream_feed(n);
+        return;
+    }
+    uint32_t pieces = QUEUE - motion_room(n), ticks = queued_ticks(m, pieces);
+    uint32_t most = PLANNER_TICK_HZ / 1000u * QUEUED_MS + motion_busy_ticks();
     for (uint32_t more = 1; more && pieces < QUEUE; pieces++) {
         if (!joins(n) && ticks >= most) break;
         // Near the join, wait for the new plan while half of the queue is left.
@@ -186,10 +217,10 @@ bool motion_overdue(unsigned n) {
            (uint32_t)parameters_get(n, BUS_PARAMETER_SETTLE_TIMEOUT);
 }
 
-uint8_t motion_settle(unsigned n, int64_t window) {
+uint8_t motion_settle(unsigned n, bool held, int64_t window) {
     struct motion* m = &motions[n];
     uint32_t now = clock_ms();
-    bool inside = motion_inside(n, window);
+    bool inside = held && motion_inside(n, window);
     if (inside && !m->inside) m->inside_ms = now;
     m->inside = inside;
     if (inside && now - m->inside_ms >= (uint32_t)parameters_get(n, BUS_PARAMETER_SETTLE_TIME))

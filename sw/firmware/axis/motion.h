@@ -10,6 +10,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "planner/plan_types.h"
+
 void motion_set_target_to_position(unsigned n);  // at once, at velocity 0, with an empty queue
 void motion_controlled_stop(unsigned n);         // within the limits of acceleration and jerk
 void motion_feed(unsigned n);  // fills the queue of the player; to be called often while it plays
@@ -30,9 +32,19 @@ bool motion_played(unsigned n);     // the player is at rest and no piece is lef
 bool motion_complete(unsigned n);   // the target is exactly where the plan ends
 uint32_t motion_ticks(unsigned n);  // duration of the motion that was planned last
 
-// Settling: the error must stay inside the window for settle_time.
+// A stream hands its pieces to the player itself. `feed` is called by motion_feed, also for axes
+// without a stream, while no plan is left; a null pointer ends this.
+void motion_set_stream(void (*feed)(unsigned n));
+// Queues a piece of at most 255 ticks; the queue must have room. `to` is the target at the end of
+// the stream, as far as it is known.
+void motion_stream(unsigned n, const struct planner_segment* piece, bool last, int64_t to);
+uint32_t motion_room(unsigned n);    // pieces that fit into the queue of the player
+uint32_t motion_queued(unsigned n);  // ticks in it, without the piece that is being played
+uint32_t motion_busy_ticks(void);    // longest time between two calls of motion_feed
+
+// Settling: the axis must be held for good and the error stay inside the window for settle_time.
 void motion_settle_begin(unsigned n);
-uint8_t motion_settle(unsigned n, int64_t window);  // ok, not_settled, or running
+uint8_t motion_settle(unsigned n, bool held, int64_t window);  // ok, not_settled, or running
 bool motion_overdue(unsigned n);  // settle_timeout has passed since motion_settle_begin
 bool motion_inside(unsigned n, int64_t window);  // the following error is inside the window now
 

@@ -39,8 +39,10 @@ static void restart(struct calibration_driver* driver) {
     driver->point = 0;
 }
 
-// The decimation of the recorder at the present speed; 0: too slow.
+// The decimation of the recorder at the present speed; 0: too slow, or in open loop, where
+// fine_response uses the recorder.
 static uint32_t every_now(unsigned n, bool phases) {
+    if (axis_state(n) == BUS_STATE_EXCITED) return 0;
     int32_t velocity = (int32_t)axis_read(n, AXIS_VELOCITY);
     uint64_t magnitude = velocity < 0 ? -(uint64_t)velocity : (uint64_t)velocity;
     uint64_t speed = magnitude * PLANNER_TICK_HZ;  // 2^-16 period/s

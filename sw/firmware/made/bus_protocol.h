@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xF4687388u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x6C7E749Bu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -81,6 +81,14 @@ enum bus_cause {
     BUS_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
     BUS_CAUSE_TABLE_POSITION_UNKNOWN = 60,    // the position of the table is not known
     BUS_CAUSE_JOB_CHANGED = 61,    // this is not the list of the job
+    // no stream is open on this axis: begin one, or it has ended: see how
+    BUS_CAUSE_NO_STREAM = 62,
+    // the queue of set-points is full: send this one again a little later
+    BUS_CAUSE_QUEUE_FULL = 63,
+    // the set-point is late: it came too late, or none came at all
+    BUS_CAUSE_SET_POINT_LATE = 64,
+    // the set-point is out of limits: too fast, or the last one is not at rest
+    BUS_CAUSE_SET_POINT_LIMITS = 65,
     // check the sub-node: it did not report the end of its turn; its faults are shown and reset
     // there
     BUS_CAUSE_CHECK_SUB_NODE = 66,
@@ -334,6 +342,10 @@ enum bus_job_flag {    // bits
     X(59, "this key has no function") \
     X(60, "the position of the table is not known") \
     X(61, "this is not the list of the job") \
+    X(62, "no stream is open on this axis") \
+    X(63, "the queue of set-points is full") \
+    X(64, "the set-point is late") \
+    X(65, "the set-point is out of limits") \
     X(66, "check the sub-node") \
     X(67, "no values are saved") \
     X(68, "the saved values are damaged") \
@@ -437,6 +449,25 @@ enum bus_operation {
     // five samples from this one on, 0 after the end; time between two samples in 64 cycles,
     // position: low word
     BUS_OPERATION_READ_SCOPE = 33,
+    // add an offset to the DAC of the fine stage, in open loop, and record the phase from then on,
+    // one in so many samples; before the first step both loops open, the command of the motor
+    // returns to 0 and the fine stage to its middle; stop, or a fault, ends it
+    BUS_OPERATION_STEP_FINE = 37,
+    // progress of that recording (a scope_state); once it is complete, its next words, in order
+    // from `first` on: two phases each, in 2^-16 period, the earlier one in the lower half; invalid
+    // 1: the signal was disturbed
+    BUS_OPERATION_READ_FINE = 38,
+    // open a stream of set-points on an axis at rest; `start` begins it; for at most late_limit
+    // ticks a missing set-point is extrapolated, 400 at most
+    BUS_OPERATION_BEGIN_STREAM = 25,
+    // append a set-point: its tick since the start, 2 to 256 after the one before, its position,
+    // and its velocity in 2^-40 period per tick; last 1 ends the stream, at rest; room: set-points
+    // that fit now
+    BUS_OPERATION_SET_POINT = 26,
+    // the stream: open 1 until it has ended, set-points that fit now, ticks that are queued at
+    // least, the tick at which the queue ends, and since begin_stream the set-points accepted and
+    // late, and the ticks extrapolated
+    BUS_OPERATION_STREAM = 27,
     BUS_OPERATION_GET_SETTING = 40,    // read a setting of a station
     BUS_OPERATION_SET_SETTING = 41,    // write a setting of a station
     // turn the table of axis 0 to an absolute angle, in 0.01 arcsec; refused while an axis moves
@@ -698,6 +729,53 @@ enum bus_operation {
 #define BUS_READ_SCOPE_REPLY_ERROR_4 55u    // i32
 #define BUS_READ_SCOPE_REPLY_COMMAND_4 59u    // i16
 #define BUS_READ_SCOPE_REPLY_TIME_4 61u    // u16
+#define BUS_STEP_FINE_REQUEST_LENGTH 7u
+#define BUS_STEP_FINE_REQUEST_AXIS 2u    // u8
+#define BUS_STEP_FINE_REQUEST_OFFSET 3u    // i16
+#define BUS_STEP_FINE_REQUEST_EVERY 5u    // u16
+#define BUS_STEP_FINE_REPLY_LENGTH 3u
+#define BUS_READ_FINE_REQUEST_LENGTH 3u
+#define BUS_READ_FINE_REQUEST_AXIS 2u    // u8
+#define BUS_READ_FINE_REPLY_LENGTH 63u
+#define BUS_READ_FINE_REPLY_STATE 3u    // u8
+#define BUS_READ_FINE_REPLY_INVALID 4u    // u8
+#define BUS_READ_FINE_REPLY_FIRST 5u    // u16
+#define BUS_READ_FINE_REPLY_WORD_0 7u    // u32
+#define BUS_READ_FINE_REPLY_WORD_1 11u    // u32
+#define BUS_READ_FINE_REPLY_WORD_2 15u    // u32
+#define BUS_READ_FINE_REPLY_WORD_3 19u    // u32
+#define BUS_READ_FINE_REPLY_WORD_4 23u    // u32
+#define BUS_READ_FINE_REPLY_WORD_5 27u    // u32
+#define BUS_READ_FINE_REPLY_WORD_6 31u    // u32
+#define BUS_READ_FINE_REPLY_WORD_7 35u    // u32
+#define BUS_READ_FINE_REPLY_WORD_8 39u    // u32
+#define BUS_READ_FINE_REPLY_WORD_9 43u    // u32
+#define BUS_READ_FINE_REPLY_WORD_10 47u    // u32
+#define BUS_READ_FINE_REPLY_WORD_11 51u    // u32
+#define BUS_READ_FINE_REPLY_WORD_12 55u    // u32
+#define BUS_READ_FINE_REPLY_WORD_13 59u    // u32
+#define BUS_BEGIN_STREAM_REQUEST_LENGTH 5u
+#define BUS_BEGIN_STREAM_REQUEST_AXIS 2u    // u8
+#define BUS_BEGIN_STREAM_REQUEST_LATE_LIMIT 3u    // u16
+#define BUS_BEGIN_STREAM_REPLY_LENGTH 3u
+#define BUS_SET_POINT_REQUEST_LENGTH 24u
+#define BUS_SET_POINT_REQUEST_AXIS 2u    // u8
+#define BUS_SET_POINT_REQUEST_LAST 3u    // u8
+#define BUS_SET_POINT_REQUEST_TICK 4u    // u32
+#define BUS_SET_POINT_REQUEST_POSITION 8u    // i64
+#define BUS_SET_POINT_REQUEST_VELOCITY 16u    // i64
+#define BUS_SET_POINT_REPLY_LENGTH 4u
+#define BUS_SET_POINT_REPLY_ROOM 3u    // u8
+#define BUS_STREAM_REQUEST_LENGTH 3u
+#define BUS_STREAM_REQUEST_AXIS 2u    // u8
+#define BUS_STREAM_REPLY_LENGTH 23u
+#define BUS_STREAM_REPLY_OPEN 3u    // u8
+#define BUS_STREAM_REPLY_ROOM 4u    // u8
+#define BUS_STREAM_REPLY_QUEUED 5u    // u16
+#define BUS_STREAM_REPLY_END 7u    // u32
+#define BUS_STREAM_REPLY_ACCEPTED 11u    // u32
+#define BUS_STREAM_REPLY_LATE 15u    // u32
+#define BUS_STREAM_REPLY_EXTRAPOLATED 19u    // u32
 #define BUS_GET_SETTING_REQUEST_LENGTH 3u
 #define BUS_GET_SETTING_REQUEST_SETTING 2u    // u8
 #define BUS_GET_SETTING_REPLY_LENGTH 11u
@@ -816,6 +894,11 @@ enum bus_operation {
     X(arm_scope, 31, 13, 3, 1) \
     X(scope, 32, 2, 6, 0) \
     X(read_scope, 33, 3, 63, 0) \
+    X(step_fine, 37, 7, 3, 1) \
+    X(read_fine, 38, 3, 63, 1) \
+    X(begin_stream, 25, 5, 3, 1) \
+    X(set_point, 26, 24, 4, 1) \
+    X(stream, 27, 3, 23, 1) \
     X(get_setting, 40, 3, 11, 0) \
     X(set_setting, 41, 11, 3, 0) \
     X(turn_to, 42, 6, 3, 0) \

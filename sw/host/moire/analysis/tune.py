@@ -14,7 +14,8 @@ v[n+1] = a v[n] + b u[n - delay].
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
@@ -44,6 +45,10 @@ UNEXPLAINED = 0.35  # of the rms of the velocity; more is too noisy, or a differ
 SATURATED = 0.05  # share of the samples at full scale; more is too much
 COHERENT = 0.8  # share of the motion at a resonance that is a response to the command
 INTEGRAL_CORNER = 1 / 8  # of the bandwidth
+LEAST_PHASE_MARGIN = 30.0  # degrees, of gains that are not refused
+LEAST_GAIN_MARGIN = 1.5
+SMALLER = 0.8  # factor from one try of a gain to the next
+TRIES = 30
 
 
 def tick_delay(hz: ArrayLike, tick_s: float) -> Complex:
@@ -53,6 +58,10 @@ def tick_delay(hz: ArrayLike, tick_s: float) -> Complex:
 
 class NotTuned(MoireError):
     """The record, or what is asked for, allows no gains; the text says why, and what would."""
+
+
+class Unsuitable(NotTuned):
+    """Gains make the loop unstable, or leave it too little margin; the text says what to change."""
 
 
 @dataclass(frozen=True)
@@ -428,20 +437,65 @@ def propose(
     rough = Tuning(
         **whole, filters=tuple(filters), bandwidth_hz=0, phase_margin_degree=0, gain_margin=0
     )
-    crossover, phase_margin, gain_margin = margins(plant, rough)
-    if phase_margin < 0.6 * phase_margin_degree or gain_margin < 1.5 or not stable(plant, rough):
+    found = with_margins(plant, rough)
+    if found.phase_margin_degree < 0.6 * phase_margin_degree or not good(plant, found):
         raise NotTuned(
             f"no gains give {phase_margin_degree:g} degrees at {bandwidth_hz:g} Hz: the loop would "
-            f"have {phase_margin:.0f} degrees and a gain margin of {gain_margin:.2f}; ask for less "
-            "bandwidth"
+            f"have {found.phase_margin_degree:.0f} degrees and a gain margin of "
+            f"{found.gain_margin:.2f}; ask for less bandwidth"
         )
-    return Tuning(
-        **whole,
-        filters=tuple(filters),
-        bandwidth_hz=crossover,
+    return found
+
+
+def with_margins(plant: Plant, tuning: Tuning) -> Tuning:
+    """The same gains and filters, with the bandwidth and the margins that they give."""
+    bandwidth_hz, phase_margin, gain_margin = margins(plant, tuning)
+    return replace(
+        tuning,
+        bandwidth_hz=bandwidth_hz,
         phase_margin_degree=phase_margin,
         gain_margin=gain_margin,
     )
+
+
+def good(plant: Plant, tuning: Tuning) -> bool:
+    """Whether the loop is stable with the margins that it must have at least."""
+    return (
+        tuning.phase_margin_degree >= LEAST_PHASE_MARGIN
+        and tuning.gain_margin >= LEAST_GAIN_MARGIN
+        and stable(plant, tuning)
+    )
+
+
+def check(plant: Plant, tuning: Tuning) -> Tuning:
+    """The gains of an axis with the margins that they give with its plant; raises Unsuitable."""
+    found = with_margins(plant, tuning)
+    if good(plant, found):
+        return found
+    wrong = "is unstable"
+    if stable(plant, found):
+        wrong = (
+            f"has a phase margin of {found.phase_margin_degree:.0f} degrees and a gain margin of "
+            f"{found.gain_margin:.2f}; it needs {LEAST_PHASE_MARGIN:.0f} degrees and "
+            f"{LEAST_GAIN_MARGIN:g}"
+        )
+    raise Unsuitable(f"with these gains the loop of the servo {wrong}: {advice(plant, found)}")
+
+
+def advice(plant: Plant, tuning: Tuning) -> str:
+    """Which gains to change, and to which values: one alone if that is enough."""
+    if tuning.kp == 0:
+        return "set kp, which is 0, or let `moire tune --write` set all gains"
+    for names in (("ki",), ("kd",), ("kp",), ("kp", "ki", "kd")):
+        for power in range(1, TRIES):
+            counts: dict[str, Any] = {
+                name: int(getattr(tuning, name) * SMALLER**power) for name in names
+            }
+            tried = with_margins(plant, replace(tuning, **counts))
+            if all(counts.values()) and good(plant, tried):
+                values = [f"{name} to {tried.real(name):.6g}" for name in names]
+                return f"set {' and '.join(values)} at most"
+    return "no smaller gains help: let `moire tune --write` set gains and filters"
 
 
 def gains_at(

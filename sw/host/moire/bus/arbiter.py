@@ -6,10 +6,11 @@
 
 An axis that moves belongs to the client whose request began the motion. Another client may read
 everything, stop the axis or switch its drive off; to begin a motion of its own, it has to stop the
-axis first. A client that leaves has its axes stopped under control, and then the drives switched
-off that it had switched on. Each client may repeat its last request to a node, whatever the others
-have sent in between: it gets the same reply, and the node does not see the repetition. The two
-words of a register of 64 bits stay together, too.
+axis first. A client that has claimed an axis owns it at once, so that it can stop it and move it
+without another one coming in between. A client that leaves has its axes stopped under control, and
+then the drives switched off that it had switched on. Each client may repeat its last request to a
+node, whatever the others have sent in between: it gets the same reply, and the node does not see
+the repetition. The two words of a register of 64 bits stay together, too.
 
 Bodies are those of docs/protocol.md. The arbiter does not send or receive; `ask` does.
 """
@@ -17,17 +18,23 @@ Bodies are those of docs/protocol.md. The arbiter does not send or receive; `ask
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 
-from moire.bus.protocol import IN_MOTION, NAMES, REQUESTS, parse_reply
+from moire.bus.protocol import IN_MOTION, MOST_AXES, NAMES, REQUESTS, parse_reply, request_body
 from moire.made.bus_tables import CAUSES, OPERATIONS, STATES
 from moire.made.registers import BLOCKS, FIELDS
 
 # what begins a motion, or drives the axis in another way
-MOTIONS = frozenset({"home", "move", "prepare", "start", "start_at_sync", "turn_to", "arm_scope"})
+MOTIONS = frozenset(
+    {
+        *("home", "move", "prepare", "start", "start_at_sync", "begin_stream", "set_point"),
+        *("turn_to", "arm_scope", "step_fine"),
+    }
+)
 POLLS = frozenset({"identify", "status", "position", "encoder", "signal"})  # may be merged
 TABLE_AXIS = 0  # the axis of turn_to
-MOST_AXES = 8  # of a node
 OTHER_CLIENT = next(code for code, (name, _) in CAUSES.items() if name == "other_client")
+CLAIM_S = 2.0  # of the time of the bus: so long a claim holds while nothing moves
 POLL_S = 0.02  # between two looks at an axis whose client has left, of the time of the bus
+SILENCE_S = 0.5  # of the time of the bus: a node that has been silent so long is given up
 
 # address, and a body without its sequence number: the reply of the node without its sequence
 # number, None if it does not answer
@@ -43,6 +50,7 @@ class Farewell:
     client: Hashable
     place: Place
     due: float  # time of the bus
+    silent_since: float | None = None  # the node has not answered since this time
 
 
 class Arbiter:
@@ -52,6 +60,7 @@ class Arbiter:
         self.ask, self.now = ask, now
         self.moved_by: dict[Place, Hashable] = {}  # the client that began the last motion
         self.switched_on_by: dict[Place, Hashable] = {}
+        self.claimed_until: dict[Place, float] = {}  # time of the bus
         # the last request of a client to a node, with its reply
         self.last: dict[tuple[Hashable, int], tuple[bytes, bytes]] = {}
         self.farewells: list[Farewell] = []
@@ -84,20 +93,31 @@ class Arbiter:
         owner = self.moved_by.get(place, client)
         if owner == client:
             return False
-        if self.state(place) in IN_MOTION:
+        if self.is_claimed(place) or self.state(place) in IN_MOTION:
             return True
         self.moved_by.pop(place)
         return False
+
+    def claim(self, client: Hashable, place: Place) -> None:
+        """The axis belongs to this client now, while it moves and for CLAIM_S from now on."""
+        self.moved_by[place] = client
+        self.claimed_until[place] = self.now() + CLAIM_S
+
+    def is_claimed(self, place: Place) -> bool:
+        """Whether a claim holds."""
+        return self.now() < self.claimed_until.get(place, 0.0)
 
     def note(self, client: Hashable, place: Place, operation: str, body: bytes) -> None:
         """The node has accepted this request for the axis."""
         if operation in MOTIONS:
             self.moved_by[place] = client
+            self.claimed_until.pop(place, None)
         elif operation == "enable" and body[-1]:
             self.switched_on_by.setdefault(place, client)
         elif operation == "enable":
             self.switched_on_by.pop(place, None)
-            self.moved_by.pop(place, None)
+            if not self.is_claimed(place):
+                self.moved_by.pop(place, None)
 
     def state(self, place: Place) -> str | None:
         """The name of the state of an axis; None if the node does not answer."""
@@ -121,7 +141,14 @@ class Arbiter:
         if not due:
             return
         farewell = min(due, key=lambda one: one.due)
-        place, state = farewell.place, self.state(farewell.place)
+        place, state, now = farewell.place, self.state(farewell.place), self.now()
+        if state is not None:
+            farewell.silent_since = None
+        elif farewell.silent_since is None:
+            farewell.silent_since = now
+        if farewell.silent_since is not None and now - farewell.silent_since < SILENCE_S:
+            farewell.due = now + POLL_S
+            return
         if state in IN_MOTION and self.moved_by.get(place) == farewell.client:
             if state != "stopping":
                 self.ask(place[0], request("stop", axis=place[1]))
@@ -134,9 +161,11 @@ class Arbiter:
         """The client has no right to the axis any more, which it does not move."""
         if self.moved_by.get(place) == client:
             self.moved_by.pop(place)
+            self.claimed_until.pop(place, None)
         if self.switched_on_by.get(place) != client:
             return
-        if moves:  # another client needs the drive, and now has to switch it off
+        if place in self.moved_by and (moves or self.is_claimed(place)):
+            # another client needs the drive, and now has to switch it off
             self.switched_on_by[place] = self.moved_by[place]
         else:
             self.switched_on_by.pop(place)
@@ -218,9 +247,7 @@ def operation_of(body: bytes) -> str:
 
 def request(operation: str, **fields: int) -> bytes:
     """The body of a request without its sequence number."""
-    known = OPERATIONS[operation]
-    values = (fields[name] for name, _ in known.request)
-    return bytes([known.code]) + REQUESTS[operation].pack(*values)
+    return request_body(operation, 0, **fields)[1:]
 
 
 def fields_of(operation: str, body: bytes) -> dict[str, int]:

@@ -7,12 +7,15 @@ CRC-32. Stuffed, it contains no zero; a zero ends it. docs/protocol.md has examp
 `cobs` does the stuffing.
 """
 
+import struct
+
 from cobs import cobs
 
 from moire.bus.protocol import (
     ADDRESSES,
     CRC_LENGTH,
     FROM_NODE,
+    READY,
     TO_NODE,
     command_byte,
     frame,
@@ -22,6 +25,11 @@ from moire.made.bus_tables import LONGEST_BODY
 
 LONGEST_PACKET = 1 + 1 + LONGEST_BODY + CRC_LENGTH
 LONGEST_STUFFED = LONGEST_PACKET + 1  # a packet is shorter than 254 bytes: one byte more
+
+# address 0 is the server itself: a request for it, and its reply, whose body ends with the speed of
+# a simulated machine in thousandths of a simulated second per second, 0 where there is none
+TO_SERVER, FROM_SERVER = TO_NODE << 4, READY | FROM_NODE << 4
+SPEED_OF_SERVER, SPEED_FIELD, THOUSAND = 0, struct.Struct("<I"), 1000
 
 
 def unstuff(stuffed: bytes) -> bytes | None:
@@ -65,6 +73,29 @@ def address_of(content: bytes, direction: int) -> int | None:
     request = direction == TO_NODE
     first = command_byte(address, TO_NODE) if request else ready_byte(address, FROM_NODE)
     return address if content[0] == first else None
+
+
+def speed_request(sequence: int) -> bytes:
+    """The packet that asks a server how fast its simulated machine runs."""
+    return packet(TO_SERVER, bytes([sequence, SPEED_OF_SERVER]))
+
+
+def speed_reply(content: bytes, speed: float | None) -> bytes | None:
+    """The packet that answers this content; None if it is no such request."""
+    body = body_of(content)
+    if content[0] != TO_SERVER or body is None or body[1:] != bytes([SPEED_OF_SERVER]):
+        return None
+    most = 256**SPEED_FIELD.size - 1
+    counts = min(round(THOUSAND * speed), most) if speed is not None else 0
+    return packet(FROM_SERVER, body + b"\0" + SPEED_FIELD.pack(counts))
+
+
+def speed_in(content: bytes) -> float | None:
+    """The speed in a reply of a server; None without one."""
+    body = body_of(content)
+    if body is None or len(body) != 3 + SPEED_FIELD.size:
+        return None
+    return SPEED_FIELD.unpack(body[3:])[0] / THOUSAND or None
 
 
 class PacketReader:

@@ -12,7 +12,8 @@ are served one after the other, and wait while an exchange of a 9-bit client is 
 client may do while another one moves an axis, and what becomes of the axes of a client that has
 gone, is decided by moire.bus.arbiter. A 9-bit client is on the bus itself, so none of this holds
 for it. A transport whose time is stopped runs at the speed of the clock, as far as this computer
-can.
+can. Clients of another kind, such as those of moire.web, run in threads of their own: they enter
+by call_soon() and ask by enqueue().
 
 The loop uses selectors and not asyncio: a transport blocks while it sends, and a simulated machine
 has to run a little between two polls of the clients, so that coroutines would have nothing to wait
@@ -25,13 +26,15 @@ import random
 import selectors
 import socket
 import time
-from collections import deque
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 from moire.bus import rfc2217
-from moire.bus.arbiter import POLLS, Arbiter, is_urgent, operation_of
-from moire.bus.cobs import PacketReader, address_of, body_of, packet
+from moire.bus.arbiter import POLLS, Arbiter, Place, is_urgent, operation_of, places_of
+from moire.bus.cobs import PacketReader, address_of, body_of, packet, speed_reply
 from moire.bus.exchanges import Exchanges
 from moire.bus.protocol import (
     CRC_LENGTH,
@@ -42,6 +45,7 @@ from moire.bus.protocol import (
     Timing,
     ready_byte,
 )
+from moire.bus.recent import Recent
 from moire.bus.transport import BITS, Transport, plain
 from moire.errors import PortError
 
@@ -56,10 +60,15 @@ REPLY_S = 0.01
 PIECE_S = 0.00025  # of the time of the bus, between two polls of the clients
 LARGEST_LAG_S = 0.01  # of a bus that is too slow: a larger lag behind the clock is forgotten
 RECEIVE = 4096
+SPEED_S = 0.5  # of the clock: over this time the speed of a stopped time is measured
 
 
 class Stream(Protocol):
-    """The connection to a client."""
+    """The connection to a client; `place` says in words where the client is."""
+
+    @property
+    def place(self) -> str:
+        """Such as 127.0.0.1:40122."""
 
     def fileno(self) -> int:
         """The file descriptor to poll."""
@@ -74,15 +83,36 @@ class Stream(Protocol):
         """Ends the connection."""
 
 
+@dataclass(frozen=True)
+class Waiting:
+    """A request that waits for the bus. `answer` takes the body of the reply, and None if the node
+    does not answer or the server ends.
+    """
+
+    client: Hashable  # as the arbiter knows it
+    address: int
+    body: bytes
+    answer: Callable[[bytes | None], None]
+
+
 class Gateway:
-    """All clients of one transport. `refused` counts packets that were no request."""
+    """All clients of one transport. `refused` counts packets that were no request. `recent` has the
+    last replies to polls, `time` the time of the bus at the last poll of the clients, and `speed`
+    how fast a stopped time runs, in seconds per second of the clock; None for the time of the
+    clock itself, and until it is measured.
+    """
 
     def __init__(self, transport: Transport):
         self.transport, self.exchanges = transport, Exchanges(transport)
+        self.recent, self.time = Recent(), transport.now()
+        self.speed: float | None = None
+        self.speed_since = time.monotonic(), self.time
+        self.calls: deque[Callable[[], None]] = deque()  # from other threads
         self.selector = selectors.DefaultSelector()
         self.listeners: list[socket.socket] = []
         self.clients: list[PacketClient] = []
-        self.waiting: deque[tuple[PacketClient, int, bytes]] = deque()  # client, address, body
+        self.waiting: deque[Waiting] = deque()
+        self.stops: Counter[Place] = Counter()  # requests that stop an axis or switch it off
         self.ninth_client: PacketClient | None = None  # the 9-bit client that sent last
         self.reply: list[int] | None = None  # its reply, as far as it has arrived
         self.held_until = self.ahead_until = 0.0
@@ -153,7 +183,7 @@ class Gateway:
             self.clients.remove(client)
             self.selector.unregister(client.stream)
             client.stream.close()
-            self.arbiter.depart(client)
+            self.depart(client)
         if client is self.ninth_client:
             self.ninth_client, self.held_until = None, 0.0
 
@@ -167,6 +197,10 @@ class Gateway:
 
     def poll(self, patience_s: float) -> None:
         """Polls all clients once, waiting at most so long, then does what they ask for."""
+        self.time = self.transport.now()
+        self.measure_speed()
+        while self.calls:
+            self.calls.popleft()()
         for key, _ in self.selector.select(patience_s):
             handle: Callable[[], None] = key.data
             handle()
@@ -176,6 +210,19 @@ class Gateway:
             self.arbiter.see_off()
             if self.waiting:
                 self.serve_next()
+
+    def call_soon(self, work: Callable[[], None]) -> None:
+        """Does this work in the thread that polls, at the next poll; for other threads."""
+        self.calls.append(work)
+
+    def measure_speed(self) -> None:
+        """How fast a stopped time has run lately."""
+        since, began = self.speed_since
+        took = time.monotonic() - since
+        if took >= SPEED_S:
+            if self.transport.time_is_stopped:
+                self.speed = (self.time - began) / took
+            self.speed_since = since + took, self.time
 
     @property
     def idle(self) -> bool:
@@ -201,6 +248,8 @@ class Gateway:
             self.dismiss(client)
         for listener in self.listeners:
             listener.close()
+        for one in self.waiting:
+            one.answer(None)
         self.selector.close()
         self.transport.close()
 
@@ -219,6 +268,7 @@ class Gateway:
             asks = words[-1] & NINTH and words[-1] >> 4 & 3 == FROM_NODE
             self.reply = [] if asks else None
         self.use_baud(baud)
+        self.recent.clear()
         self.transport.send(words)
         self.hold()
 
@@ -239,34 +289,55 @@ class Gateway:
                 self.reply, self.held_until = None, 0.0
 
     def take_packet(self, client: "PacketClient", content: bytes) -> None:
-        """Queues a request. A client that asks again has given up its earlier request."""
+        """Queues a request. A client that asks again has given up its earlier request. A request to
+        the server itself is answered at once.
+        """
+        if (own := speed_reply(content, self.speed)) is not None:
+            client.send(own)
+            return
         address, body = address_of(content, TO_NODE), body_of(content)
         if address is None or body is None:
             self.refused += 1
             return
-        self.waiting = deque(entry for entry in self.waiting if entry[0] is not client)
-        if is_urgent(body):
-            self.waiting.appendleft((client, address, body))
+        self.forget_requests(client)
+        self.enqueue(Waiting(client, address, body, partial(client.answer, address)))
+
+    def enqueue(self, one: Waiting) -> None:
+        """Queues a request; one that stops an axis goes ahead of the others."""
+        if is_urgent(one.body):
+            self.stops.update(places_of(one.address, operation_of(one.body), one.body))
+            self.waiting.appendleft(one)
         else:
-            self.waiting.append((client, address, body))
+            self.waiting.append(one)
+
+    def forget_requests(self, client: Hashable) -> None:
+        """What this client has asked for, and has not been asked of a node yet, is not done."""
+        self.waiting = deque(one for one in self.waiting if one.client is not client)
+
+    def depart(self, client: Hashable) -> None:
+        """A client has left: nothing more is done for it, and what it moves is stopped."""
+        for one in [one for one in self.waiting if one.client is client]:
+            one.answer(None)
+        self.forget_requests(client)
+        self.arbiter.depart(client)
 
     def serve_next(self) -> None:
         """Answers the request that has waited longest, and with the same reply those of other
         clients who poll the same.
         """
-        client, address, body = self.waiting.popleft()
-        reply = self.arbiter.answer(client, address, body)
-        asked = [(client, body)]
-        if operation_of(body) in POLLS:
-            alike = [
-                entry for entry in self.waiting if entry[1] == address and entry[2][1:] == body[1:]
+        first = self.waiting.popleft()
+        reply = self.arbiter.answer(first.client, first.address, first.body)
+        asked = [first]
+        if operation_of(first.body) in POLLS:
+            asked += [
+                one
+                for one in self.waiting
+                if one.address == first.address and one.body[1:] == first.body[1:]
             ]
-            for entry in alike:
-                self.waiting.remove(entry)
-                asked.append((entry[0], entry[2]))
-        if reply is not None:
-            for one, its_body in asked:
-                one.send(packet(ready_byte(address, FROM_NODE), its_body[:1] + reply[1:]))
+            for one in asked[1:]:
+                self.waiting.remove(one)
+        for one in asked:
+            one.answer(None if reply is None else one.body[:1] + reply[1:])
 
     def ask(self, address: int, body: bytes) -> bytes | None:
         """The reply of a node, both bodies without their sequence numbers; None without a reply."""
@@ -281,11 +352,14 @@ class Gateway:
         exchange = self.exchanges.run(
             Exchange(address, bytes([sequence]) + body, tries, timing, self.transport.handshake)
         )
-        if exchange.reply is None:
+        received = None if exchange.reply is None else bytes(exchange.received[3:-CRC_LENGTH])
+        self.time = self.transport.now()
+        self.recent.note(address, body, received, self.time)
+        if received is None:
             self.present.discard(address)
-            return None
-        self.present.add(address)
-        return bytes(exchange.received[3:-CRC_LENGTH])
+        else:
+            self.present.add(address)
+        return received
 
 
 # ------------------------------------------------------------------ clients
@@ -294,8 +368,13 @@ class Gateway:
 class PacketClient:
     """A client that sends COBS packets."""
 
+    kind = "COBS client"
+
     def __init__(self, gateway: Gateway, stream: Stream):
         self.gateway, self.stream, self.packets = gateway, stream, PacketReader()
+
+    def __str__(self) -> str:
+        return f"the {self.kind} at {self.stream.place}"
 
     def arrive(self) -> None:
         """Reads what the client sent; forgets a client that has gone."""
@@ -310,6 +389,11 @@ class PacketClient:
         for content in self.packets.feed(data):
             self.gateway.take_packet(self, content)
 
+    def answer(self, address: int, reply: bytes | None) -> None:
+        """Sends the reply to a request, if there is one."""
+        if reply is not None:
+            self.send(packet(ready_byte(address, FROM_NODE), reply))
+
     def send(self, data: bytes) -> None:
         """Sends what came from the bus."""
         self.put(data)
@@ -322,6 +406,8 @@ class PacketClient:
 
 class Rfc2217Client(PacketClient):
     """A client of RFC 2217: 9-bit words where its port has a parity, COBS packets where not."""
+
+    kind = "RFC 2217 client"
 
     def __init__(self, gateway: Gateway, stream: Stream):
         super().__init__(gateway, stream)
@@ -348,6 +434,10 @@ class SocketStream:
 
     def __init__(self, connection: socket.socket):
         self.connection = connection
+        try:
+            self.place = "{}:{}".format(*connection.getpeername()[:2])
+        except OSError:  # it has gone already
+            self.place = "an address that has gone"
 
     def fileno(self) -> int:
         """The file descriptor to poll."""
@@ -376,6 +466,8 @@ class SocketStream:
 
 class TerminalStream:
     """A pseudo terminal. It holds the far end open too, so that it outlives its clients."""
+
+    place = "the pseudo terminal"
 
     def __init__(self, near: int, far: int):
         self.near, self.far = near, far

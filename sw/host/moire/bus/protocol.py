@@ -21,6 +21,7 @@ READY = 0x40  # bits 7 and 6 of a ready byte are 01
 ADDRESSES = range(1, 16)
 ODD_ADDRESSES = (1, 2, 4, 7, 8, 11, 13, 14)  # those that odd parity can reach
 CRC_LENGTH = 4
+MOST_AXES = 8  # of a node: the bits of a mask of axes
 
 FORMATS = {
     "u8": "B",

@@ -19,7 +19,15 @@ from collections.abc import Callable, Iterable, Sequence
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
-from moire.bus.cobs import LONGEST_STUFFED, PacketReader, sealed
+from moire.bus.cobs import (
+    FROM_SERVER,
+    LONGEST_PACKET,
+    LONGEST_STUFFED,
+    PacketReader,
+    sealed,
+    speed_in,
+    speed_request,
+)
 from moire.bus.protocol import FROM_NODE, NINTH, ODD_ADDRESSES, TO_NODE, ready_byte
 from moire.bus.twin_port import machine_of, open_twin
 from moire.errors import PortError
@@ -38,6 +46,7 @@ CMSPAR_OF_LINUX = 0o10000000000
 # never changes
 POLL_S = 0.005
 BREAK_S = 0.01  # nodes need 2 ms
+SERVER_S = 0.1  # of patience with a server that may be too old to say its speed
 NETWORK_S = 0.1  # what a network may add to an answer, and to the gaps in it
 PARITIES = ("auto", "mark", "odd", "none")
 PARITY_OF_RFC2217 = {"O": b"\x02", "E": b"\x03", "M": b"\x04", "S": b"\x05"}
@@ -86,6 +95,12 @@ class Transport(abc.ABC):
 
         Nothing happens where no bus of nodes is at the other end.
         """
+
+    def speed(self) -> float | None:
+        """How fast the machine of a server runs, in simulated seconds per second of the clock; None
+        where nothing is simulated, or it is not known.
+        """
+        return None
 
     def close(self) -> None:
         """Releases the port; the transport cannot be used any more."""
@@ -144,6 +159,10 @@ class PortBus(Transport):
         if "://" not in port and open_port is None:
             # a second program on the bus would break the exchanges of both
             arguments["exclusive"] = True
+        if open_port is None and port.startswith("socket://"):
+            from moire.bus.tcp_port import TcpPort
+
+            open_port = TcpPort
         try:
             return (open_port or serial.serial_for_url)(port, **arguments)
         except port_errors(ValueError) as error:
@@ -343,6 +362,11 @@ class CobsBus(PortBus):
                     self.arrived, self.awaited = list(content), None
         words, self.arrived = self.arrived[:count], self.arrived[count:]
         return words
+
+    def speed(self) -> float | None:
+        self.arrived, self.awaited = [], FROM_SERVER
+        self.write(speed_request(0))
+        return speed_in(bytes(self.receive(LONGEST_PACKET, SERVER_S)))
 
 
 def port_errors(*more: type[Exception]) -> tuple[type[Exception], ...]:

@@ -8,7 +8,7 @@ import signal
 import sys
 from typing import TextIO
 
-from moire.cli import commands, completion
+from moire.cli import completion
 from moire.cli.files import OutputError
 from moire.cli.options import Options
 from moire.cli.parser import moire, parse_call, parse_line
@@ -16,7 +16,7 @@ from moire.cli.session import Interrupted, OpenTransport, Session
 from moire.cli.signals import Ended, ending_by_signals
 from moire.errors import MoireError
 
-__all__ = ["commands", "main", "moire", "parse_call", "parse_line"]
+__all__ = ["main", "moire", "parse_call", "parse_line"]
 
 
 def main(

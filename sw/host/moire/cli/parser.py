@@ -6,10 +6,13 @@ chain is parsed completely before its first command is carried out.
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
 import click
 
+from moire.cli import commands
+from moire.cli.commands import MODULES, SECTIONS
 from moire.cli.files import OutputError
 from moire.cli.options import COMMON, GIVEN, OF_THE_CALL, OF_THE_PORT, Common, Options
 from moire.cli.values import did_you_mean, marked, near_names
@@ -37,32 +40,6 @@ different sources; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP: a moving axis was stoppe
 Completion of commands, options and names by the Tab key, for bash (or zsh, fish):
   eval "$(_MOIRE_COMPLETE=bash_source moire)"
 """
-SECTIONS = {  # of the help, in which every command appears once
-    "Nodes": ("find", "built", "counters", "baud", "selftest", "register"),
-    "Drives and motion": (
-        "status",
-        "enable",
-        "disable",
-        "home",
-        "move",
-        "finish",
-        "stop",
-        "pause",
-        "resume",
-        "override",
-        "prepare",
-        "start",
-        "wait",
-        "watch",
-        "drive",
-    ),
-    "Faults": ("fault", "reset"),
-    "Parameters and tuning": ("params", "tune", "scope"),
-    "Sensor": ("encoder", "signal", "calibrate", "commission", "correction", "segments", "index"),
-    "Events": ("capture", "compare"),
-    "Stations and rings": ("turn", "settings", "job", "relay"),
-    "Files, shell and servers": ("run", "shell", "replay", "serve", "twin", "study"),
-}
 STANDS_ALONE = ("run", "serve", "shell", "twin", "study")
 
 
@@ -195,14 +172,21 @@ class Moire(Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The commands in the order of the sections."""
-        return [name for names in SECTIONS.values() for name in names]
+        return list(MODULES)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command, whose module is imported when it is first used; None if there is none."""
+        if cmd_name in MODULES:
+            import_module(f"{commands.__name__}.{MODULES[cmd_name]}")
+        return super().get_command(ctx, cmd_name)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The commands by section."""
         for title, names in SECTIONS.items():
             with formatter.section(title):
+                made = {name: self.get_command(ctx, name) for name in names}
                 formatter.write_dl(
-                    [(name, self.commands[name].get_short_help_str()) for name in names]
+                    [(name, each.get_short_help_str()) for name, each in made.items() if each]
                 )
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -265,7 +249,7 @@ def parse_part(part: list[str]) -> Planned:
         name = names_of(error.ctx)[:1] if error.ctx else []
         if not name and isinstance(error, click.exceptions.NoSuchCommand):
             name = [error.command_name]
-        name += [word for word in part if word in moire.commands]
+        name += [word for word in part if word in MODULES]
         path = error.ctx.command_path if error.ctx else " ".join(["moire", *name[:1]])
         raise UsageError(
             f"{sentence(error)} (see: {path} --help)", next(iter(name), None)
@@ -278,8 +262,9 @@ def parse_part(part: list[str]) -> Planned:
 def sentence(error: click.UsageError) -> str:
     """What is wrong, in the words of all other errors of `moire`."""
     text = error.message
-    if isinstance(error, click.exceptions.NoSuchCommand) and isinstance(error.ctx, click.Context):
-        known = getattr(error.ctx.command, "commands", ())
+    if isinstance(error, click.exceptions.NoSuchCommand) and error.ctx:
+        group = error.ctx.command
+        known = group.list_commands(error.ctx) if isinstance(group, click.Group) else ()
         near = did_you_mean(near_names(error.command_name, known))
         return f"there is no command '{error.command_name}'{near}"
     if isinstance(error, click.NoSuchOption):

@@ -47,7 +47,7 @@ def add_value_commands(
             f"{value.name:<20}{value.written(6):<15}{value.range_words:<33}{value.text}"
             for value in found
         ]
-        say(call, {f"{what}s": [for_json(value) for value in found]}, "\n".join(rows))
+        say(call, {f"{what}s": [value.values() for value in found]}, "\n".join(rows))
 
     def show_all(call: Call) -> None:
         show(call, map(values_of(call).get, known))
@@ -70,20 +70,6 @@ def add_value_commands(
     one_name = click.argument("name", type=name, metavar="NAME", help=name_help)
     value = click.argument("value", type=TEXT, metavar="VALUE", help=value_help)
     group.command("set", help=f"Set one {what}.", example=for_set)(one_name(value(put)))
-
-
-def for_json(value: ParameterValue) -> dict[str, Any]:
-    """A value with its range and its meaning."""
-    return {
-        "name": value.name,
-        "value": value.value,
-        "unit": value.unit,
-        "written": value.written(),
-        "minimum": value.minimum,
-        "maximum": value.maximum,
-        "default": value.default,
-        "text": value.text,
-    }
 
 
 def add_action_commands(

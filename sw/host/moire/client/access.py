@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -72,7 +73,7 @@ class AxisAccess:
 
     def to_nm(self, counts: int) -> float:
         """A length in nm from counts on the bus."""
-        return float(counts * self.period_nm / COUNTS)
+        return length_of_counts(counts, self.period_nm)
 
     def to_counts(self, nm: units.Value) -> int:
         """The nearest counts on the bus of a length: a number in nm, or a text with a unit."""
@@ -80,24 +81,33 @@ class AxisAccess:
 
     def status(self) -> Status:
         """State, faults, position, target, velocity and drive command at one moment."""
-        reply = self.request("status")
-        flags = bit_names(FLAGS, reply["flags"])
-        return Status(
-            state=code_name(STATES, reply["state"], "state"),
-            ended=code_name(CAUSES, reply["ended"], "cause"),
-            enabled="enabled" in flags,
-            homed="homed" in flags,
-            limit_low="limit_low" in flags,
-            limit_high="limit_high" in flags,
-            estop="estop" in flags,
-            settled="settled" in flags,
-            saturated="saturated" in flags,
-            faults=bit_names(FAULTS, reply["faults"]),
-            first_fault=bit_names(FAULTS, reply["first_fault"]),
-            encoder_events=bit_names(ENCODER_EVENTS, reply["encoder_events"]),
-            position_nm=self.to_nm(reply["position"]),
-            target_nm=self.to_nm(reply["target"]),
-            velocity_mm_s=self.to_nm(reply["velocity"]) * self.node.identity.tick_hz / 1e6,
-            drive_command=reply["command"] / FULL_SCALE,
-            counts=reply["counts"],
-        )
+        return status_of(self.request("status"), self.period_nm, self.node.identity.tick_hz)
+
+
+def length_of_counts(counts: int, period_nm: Fraction) -> float:
+    """A length in nm from counts on the bus."""
+    return float(counts * period_nm / COUNTS)
+
+
+def status_of(reply: Mapping[str, int], period_nm: Fraction, tick_hz: int) -> Status:
+    """The status of an axis from the fields of the reply to `status`."""
+    flags = bit_names(FLAGS, reply["flags"])
+    return Status(
+        state=code_name(STATES, reply["state"], "state"),
+        ended=code_name(CAUSES, reply["ended"], "cause"),
+        enabled="enabled" in flags,
+        homed="homed" in flags,
+        limit_low="limit_low" in flags,
+        limit_high="limit_high" in flags,
+        estop="estop" in flags,
+        settled="settled" in flags,
+        saturated="saturated" in flags,
+        faults=bit_names(FAULTS, reply["faults"]),
+        first_fault=bit_names(FAULTS, reply["first_fault"]),
+        encoder_events=bit_names(ENCODER_EVENTS, reply["encoder_events"]),
+        position_nm=length_of_counts(reply["position"], period_nm),
+        target_nm=length_of_counts(reply["target"], period_nm),
+        velocity_mm_s=length_of_counts(reply["velocity"], period_nm) * tick_hz / 1e6,
+        drive_command=reply["command"] / FULL_SCALE,
+        counts=reply["counts"],
+    )

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from moire import units
 from moire.client import calibration, index_survey
+from moire.client import stream as streams
 from moire.client.access import COUNTS, FULL_SCALE
 from moire.client.capture import AxisCapture
 from moire.client.names import CAUSE_CODES, bit_names, code_name, descriptions
@@ -46,7 +47,10 @@ if TYPE_CHECKING:
     from moire.client.node import Node
 
 HARMONICS = 10  # orders of phase error that are corrected
+REACT_S = 0.3  # that a program needs to notice that its motion was stopped, and to end
 SCATTER = 1 << 20  # counts of the calibration's scatter in one signal period
+MOST_LATE_TICKS = 400  # that a stream may extrapolate
+PROGRESS_S = 0.02  # a stream reports its progress only while its queue lasts longer
 OUTPUTS = ("bridge", "stepper", "dac", "fine_stage")  # in the order of the parameter drive
 CORRECTION = ("sin_offset", "cos_offset", "gain", "quadrature_error")
 
@@ -188,6 +192,101 @@ class Axis(AxisParameters, AxisCapture):
         length = length_of("prepare", target, nm, um, mm)
         return self.to_target(length, by, lambda at: self.duration_s("prepare", at))
 
+    def stream(
+        self,
+        points: Iterable[streams.Point],
+        late_limit: units.Value = "10ms",
+        progress: Progress | None = None,
+    ) -> Status:
+        """Plays a path of points (time, position, velocity); returns when the axis has settled at
+        its end.
+
+        The axis first moves to the first point, where the path begins at rest. `late_limit` (s, or
+        a text) is how long the node may continue at constant velocity when the next point has not
+        come in time; then it stops under control. `progress` is called with a Status from time to
+        time. The whole path is checked before anything moves. Raises OutOfRange, Refused or
+        MotionFailed. Whatever interrupts the wait, Ctrl-C too, stops the axis under control.
+        """
+        path = streams.checked(points)
+        try:
+            self.request("stream")
+        except Refused as refused:
+            if refused.cause == "not_built":
+                raise with_more(refused, streams.REMEDY) from None
+            raise
+        tick_hz = self.node.identity.tick_hz
+        late_ticks = round(units.parse_time(late_limit) * tick_hz)
+        if not 0 <= late_ticks <= MOST_LATE_TICKS:
+            given = units.format_time(units.parse_time(late_limit))
+            most = units.format_time(Fraction(MOST_LATE_TICKS, tick_hz))
+            raise OutOfRange(f"the late limit is {given}; allowed is 0 to {most}")
+        streams.check_limits(path, self.stream_limits())
+        wire = streams.set_points(path, self.period_nm, tick_hz)
+        begin = path[0].position_nm
+
+        def carry_out() -> Status:
+            status = self.status()
+            if self.to_counts(Fraction(status.target_nm)) != self.to_counts(begin):
+                self.to_target(begin, False, lambda at: self.motion("move", progress, target=at))
+            self.request("begin_stream", late_limit=late_ticks)
+            self.feed(wire, progress)
+            return self.wait(progress)
+
+        return self.stopping_on_error(carry_out)
+
+    def stream_limits(self) -> streams.Limits:
+        """The limits that hold for a stream."""
+        velocity, acceleration = (
+            self.get_parameter(name).value for name in ("velocity", "acceleration")
+        )
+        return streams.Limits(velocity, acceleration)
+
+    def feed(self, wire: Sequence[streams.SetPoint], progress: Progress | None) -> None:
+        """Sends the set-points of a stream, as the queue has room; starts it when that is full."""
+        started = False
+        room = 1
+        for n, set_point in enumerate(wire):
+            while room == 0:
+                if not started:
+                    self.node.request("start", axes=1 << self.number)
+                    started = True
+                room = self.room_of_stream(progress)
+            room = self.send(set_point, last=n == len(wire) - 1)
+        if not started:
+            self.node.request("start", axes=1 << self.number)
+
+    def send(self, set_point: streams.SetPoint, last: bool) -> int:
+        """Sends a set-point; returns for how many more the queue has room. A refusal ends the
+        stream: then the axis stops, and the error names how, or the point.
+        """
+        try:
+            return self.request(
+                "set_point",
+                last=int(last),
+                tick=set_point.tick,
+                position=set_point.position,
+                velocity=set_point.velocity,
+            )["room"]
+        except Refused as refused:
+            if refused.cause == "no_stream":
+                self.wait()  # raises how it ended
+            self.stop_and_wait()
+            raise with_more(refused, streams.named(set_point.point)) from None
+
+    def room_of_stream(self, progress: Progress | None) -> int:
+        """Lets half of the time pass that the queue lasts, or less; returns its room. Raises
+        MotionFailed if the stream has ended.
+        """
+        queue = self.request("stream")
+        if not queue["open"]:
+            self.wait(progress)
+        if queue["room"] == 0:
+            seconds = queue["queued"] / self.node.identity.tick_hz / 2
+            if progress is not None and seconds > PROGRESS_S:
+                progress(self.status())
+            self.node.bus.until_next_poll(self.node, min(self.node.bus.poll_s, seconds))
+        return queue["room"]
+
     def duration_s(self, operation: str, target: int) -> float:
         """Requests a motion to a target in counts; returns its duration in seconds."""
         ticks = self.request(operation, target=target)["duration_ticks"]
@@ -241,6 +340,10 @@ class Axis(AxisParameters, AxisCapture):
             if status.ended != "running":
                 break
             self.node.bus.until_next_poll(self.node)
+        return self.reached(status)
+
+    def reached(self, status: Status) -> Status:
+        """The status at the end of a motion; raises MotionFailed unless it reached its target."""
         if status.ended in ("ok", "no_motion_yet"):
             return status
         sentence = f"axis {self.number} of node {self.node.address}: {status.ended_words}"
@@ -282,6 +385,14 @@ class Axis(AxisParameters, AxisCapture):
                 f"its watchdog has to: {error}",
             )
             raise error from None
+
+    def take_over(self) -> None:
+        """Stops a motion that another client of the bus began. Returns when the other one has had
+        time to switch off what it had switched on.
+        """
+        if self.status().in_motion:
+            self.stop_and_wait()
+            self.dwell(REACT_S)
 
     def stop_if_enabled(self) -> None:
         """Like stop_and_wait(), but drops errors: one of several axes must not keep the others."""

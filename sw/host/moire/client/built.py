@@ -13,6 +13,7 @@ NEEDS = {  # what a request needs; what a parameter needs is in its table
     **dict.fromkeys(("enable", "home", "move", "prepare", "arm_scope"), "drive"),
     "signal": "monitor",
     "calibration": "recorder",
+    "step_fine": "fine_stage",
     **dict.fromkeys(("get_correction", "set_correction", "get_harmonic"), "sine"),
     "set_harmonic": "harmonics",
     "set_segments": "segments",

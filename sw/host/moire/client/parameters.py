@@ -163,6 +163,16 @@ class AxisParameters(AxisAccess):
 
         return {name: counts[name] for name in sorted(counts, key=turn)}
 
+    def tuning(self) -> tuple[dict[str, int], tuple[tuple[int, ...], ...]]:
+        """The gains of the servo by name, and the coefficients of each filter that is in use."""
+        used = self.get_parameter("filters").counts
+        filters = tuple(
+            tuple(self.get_parameter(f"filter_{number + 1}_{name}").counts for name in FILTER)
+            for number in range(FILTERS)
+            if used >> number & 1
+        )
+        return {name: self.get_parameter(name).counts for name in GAINS}, filters
+
     def set_tuning(self, tuning: Tuning) -> None:
         """Sets the gains and filters that moire.analysis.tune made.
 

@@ -2,9 +2,9 @@
 """What the methods of Bus, Node and Axis return. A unit is part of each field's name or comment."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
-from typing import TypedDict
+from typing import Any, TypedDict
 
 from moire.bus.protocol import IN_MOTION
 from moire.client.names import descriptions
@@ -100,6 +100,15 @@ class Status:
     def in_motion(self) -> bool:
         """Whether a motion or a stop is under way."""
         return self.state in IN_MOTION
+
+    def values(self) -> dict[str, Any]:
+        """All fields for JSON, with the words for state, faults and the last motion."""
+        return {
+            **asdict(self),
+            "words": self.words,
+            "fault_words": self.fault_words,
+            "ended_words": self.ended_words,
+        }
 
 
 Progress = Callable[[Status], object]  # called with a Status from time to time during a motion

@@ -4,6 +4,7 @@
 import re
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Any
 
 from moire import units
 from moire.errors import OutOfRange, UnknownName
@@ -65,6 +66,19 @@ class ParameterValue:
         if self.name in CHOICES:
             return CHOICES[self.name][self.counts]
         return units.with_unit(self.quantity, self.value, digits)
+
+    def values(self) -> dict[str, Any]:
+        """The value for JSON, with its range and its meaning."""
+        return {
+            "name": self.name,
+            "value": float(self.value),
+            "unit": self.unit,
+            "written": self.written(),
+            "minimum": float(self.minimum),
+            "maximum": float(self.maximum),
+            "default": float(self.default),
+            "text": self.text,
+        }
 
     @property
     def range_words(self) -> str:

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xF4687388
+PROTOCOL_CRC = 0x6C7E749B
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -96,6 +96,11 @@ CAUSES = {
     59: ("key_without_function", "this key has no function"),
     60: ("table_position_unknown", "the position of the table is not known"),
     61: ("job_changed", "this is not the list of the job"),
+    62: ("no_stream", "no stream is open on this axis: begin one, or it has ended: see how"),
+    63: ("queue_full", "the queue of set-points is full: send this one again a little later"),
+    64: ("set_point_late", "the set-point is late: it came too late, or none came at all"),
+    65: ("set_point_limits",
+         "the set-point is out of limits: too fast, or the last one is not at rest"),
     66: ("check_sub_node",
          "check the sub-node: it did not report the end of its turn; its faults are shown and "
          "reset there"),
@@ -445,6 +450,44 @@ OPERATIONS = {operation.name: operation for operation in (
                ("position_3", "i32"), ("error_3", "i32"), ("command_3", "i16"),
                ("time_3", "u16"), ("position_4", "i32"), ("error_4", "i32"),
                ("command_4", "i16"), ("time_4", "u16"),)),
+    Operation("step_fine", 37,
+              "add an offset to the DAC of the fine stage, in open loop, and record the phase "
+              "from then on, one in so many samples; before the first step both loops open, the "
+              "command of the motor returns to 0 and the fine stage to its middle; stop, or a "
+              "fault, ends it",
+              (("axis", "u8"), ("offset", "i16"), ("every", "u16"),),
+              ()),
+    Operation("read_fine", 38,
+              "progress of that recording (a scope_state); once it is complete, its next words, "
+              "in order from `first` on: two phases each, in 2^-16 period, the earlier one in the "
+              "lower half; invalid 1: the signal was disturbed",
+              (("axis", "u8"),),
+              (("state", "u8"), ("invalid", "u8"), ("first", "u16"),
+               ("word_0", "u32"), ("word_1", "u32"), ("word_2", "u32"),
+               ("word_3", "u32"), ("word_4", "u32"), ("word_5", "u32"),
+               ("word_6", "u32"), ("word_7", "u32"), ("word_8", "u32"),
+               ("word_9", "u32"), ("word_10", "u32"), ("word_11", "u32"),
+               ("word_12", "u32"), ("word_13", "u32"),)),
+    Operation("begin_stream", 25,
+              "open a stream of set-points on an axis at rest; `start` begins it; for at most "
+              "late_limit ticks a missing set-point is extrapolated, 400 at most",
+              (("axis", "u8"), ("late_limit", "u16"),),
+              ()),
+    Operation("set_point", 26,
+              "append a set-point: its tick since the start, 2 to 256 after the one before, its "
+              "position, and its velocity in 2^-40 period per tick; last 1 ends the stream, at "
+              "rest; room: set-points that fit now",
+              (("axis", "u8"), ("last", "u8"), ("tick", "u32"),
+               ("position", "i64"), ("velocity", "i64"),),
+              (("room", "u8"),)),
+    Operation("stream", 27,
+              "the stream: open 1 until it has ended, set-points that fit now, ticks that are "
+              "queued at least, the tick at which the queue ends, and since begin_stream the "
+              "set-points accepted and late, and the ticks extrapolated",
+              (("axis", "u8"),),
+              (("open", "u8"), ("room", "u8"), ("queued", "u16"),
+               ("end", "u32"), ("accepted", "u32"), ("late", "u32"),
+               ("extrapolated", "u32"),)),
     Operation("get_setting", 40, "read a setting of a station",
               (("setting", "u8"),),
               (("value", "i64"),)),

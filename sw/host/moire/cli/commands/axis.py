@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands about the state of an axis: status, enable, disable, stop, wait, reset."""
 
-from dataclasses import asdict
 from fractions import Fraction
 from typing import Any
 
@@ -24,7 +23,8 @@ WITHOUT_SINE = "counts only: built without sine and cosine"
 def status(call: Call) -> None:
     """One read-back of the axis."""
     axis = call.axis
-    say_status(call, axis.status(), sine=axis.has_sine())
+    found, sine = axis.status(), axis.has_sine()
+    say_status(call, found, sine=sine, speed=call.bus.transport.speed())
 
 
 @moire.command(
@@ -95,13 +95,7 @@ def reset(call: Call) -> None:
 
 def say_status(call: Call, status: Status, **built: Any) -> None:
     """Print a status with the words for its state, switches and faults."""
-    values = {
-        **asdict(status),
-        **built,
-        "words": status.words,
-        "fault_words": status.fault_words,
-        "ended_words": status.ended_words,
-    }
+    values = {**status.values(), **built}
     possible = (
         (status.limit_low, "low end pressed"),
         (status.limit_high, "high end pressed"),
@@ -122,6 +116,8 @@ def say_status(call: Call, status: Status, **built: Any) -> None:
         rows.append(("encoder", ", ".join(status.encoder_events)))
     if not built.get("sine", True):
         rows.append(("sensor", WITHOUT_SINE))
+    if (speed := built.get("speed")) is not None:
+        rows.append(("twin", f"{speed:.2f} simulated seconds per second"))
     homed = "zero known" if status.homed else "not homed"
     call.say_of_axis(values, table(f"{call.where}: {status.words}, {homed}", rows, 9))
 

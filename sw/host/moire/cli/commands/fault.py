@@ -6,6 +6,7 @@ from moire.analysis import selftest as checks
 from moire.cli.commands.axis import table
 from moire.cli.parser import moire
 from moire.cli.session import Call
+from moire.client import remedies
 from moire.client.records import Signal
 
 
@@ -27,6 +28,7 @@ def fault(call: Call) -> None:
         "encoder_events": status.encoder_events,
         "signal_faults": signal.faults,
         "first_signal_faults": signal.first,
+        "to_do": remedies.of_faults(status.first_fault if status.faults else ()),
     }
     if not status.faults:
         call.say_of_axis(values, f"{call.where}: no fault is latched")
@@ -38,7 +40,8 @@ def fault(call: Call) -> None:
     if signal.first:
         rows.append(("signal", signal.first_words))
     home = "" if status.homed else ", then 'moire home'"
-    rows.append(("to do", f"remove the cause, then 'moire reset'{home}"))
+    to_do = remedies.of_faults(status.first_fault or status.faults)
+    rows.append(("to do", f"{to_do}; then 'moire reset'{home}"))
     call.say_of_axis(values, table(f"{call.where}: {status.fault_words}", rows, 9))
 
 

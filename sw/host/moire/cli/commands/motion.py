@@ -24,6 +24,12 @@ BY = click.option(
     "--by", is_flag=True, help="LENGTH is a distance from the present target, not a position."
 )
 
+TAKE = click.option(
+    "--take",
+    is_flag=True,
+    help="If another client of the bus moves the axis, stop it and take the axis over.",
+)
+
 
 @moire.command(
     "home",
@@ -37,8 +43,11 @@ BY = click.option(
     help="1, 2, 17, 18, 33, 34, 35 or 37 of CiA 402; s0: limit switch, distance, phase zero; s3: "
     "reference mark from either side. The default is the parameter home_method.",
 )
-def home(call: Call, method: str | None) -> None:
+@TAKE
+def home(call: Call, method: str | None, take: bool) -> None:
     """Returns when the axis is at rest and its zero is known."""
+    if take:
+        call.axis.take_over()
     run_motion(call, lambda axis, show: axis.home(progress=show, method=method))
 
 
@@ -54,8 +63,11 @@ def home(call: Call, method: str | None) -> None:
     is_flag=True,
     help="Only start the motion; pause, resume, stop or finish may follow.",
 )
-def move(call: Call, target: Fraction, by: bool, no_wait: bool) -> None:
+@TAKE
+def move(call: Call, target: Fraction, by: bool, no_wait: bool, take: bool) -> None:
     """Returns when the axis has settled at its target."""
+    if take:
+        call.axis.take_over()
     if no_wait:
         seconds = call.switch_on().begin_move(nm=target, by=by)
         say_duration(call, "on its way", seconds)

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command tune."""
 
+from __future__ import annotations
+
 import re
+from collections.abc import Mapping
 from dataclasses import asdict
 from fractions import Fraction
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,12 +17,29 @@ from moire.cli.session import Call
 from moire.cli.values import DISTANCE, DURATION, FILE, FREQUENCY, NUMBER, SHARE_ABOVE_ZERO
 from moire.errors import BadFile
 
+if TYPE_CHECKING:
+    from moire.analysis import tune as tuner
+    from moire.client.axis import Axis
+
+
+def contradiction(given: Mapping[str, Any]) -> str | None:
+    """What is wrong with the options together."""
+    if given["check"] and given["write"]:
+        return "--check and --write do not go together: a check changes nothing"
+    if given["check"] and given["bandwidth"] is not None:
+        return "--check and --bandwidth do not go together: the axis has its gains"
+    if not given["check"] and given["bandwidth"] is None:
+        return "--bandwidth is missing"
+    return None
+
 
 @moire.command(
     "tune",
     help="Compute the gains of the servo from the open-loop response of the axis, which is "
-    "recorded now or read from a file.",
+    "recorded now or read from a file, or check those that the axis has. See `moire fine` for the "
+    "fine stage.",
     example="moire --port /dev/ttyUSB0 tune --bandwidth 40Hz --picture tuning.png",
+    check=contradiction,
 )
 @click.argument(
     "file",
@@ -51,10 +72,9 @@ from moire.errors import BadFile
 )
 @click.option(
     "--bandwidth",
-    required=True,
     type=FREQUENCY,
     metavar="FREQUENCY",
-    help="The bandwidth of the closed loop, such as 40Hz.",
+    help="The bandwidth of the closed loop, such as 40Hz. Only --check needs none.",
 )
 @click.option(
     "--margin",
@@ -72,6 +92,12 @@ from moire.errors import BadFile
 @click.option(
     "--picture", type=FILE, metavar="FILE", help="Draw Bode plot and step response, as PNG."
 )
+@click.option(
+    "--check",
+    is_flag=True,
+    help="Compute the loop with the gains and filters that the axis has. Too little margin is an "
+    "error, which says what to change.",
+)
 @click.option("--write", is_flag=True, help="Write gains and filters to the axis.")
 def tune(
     call: Call,
@@ -79,10 +105,11 @@ def tune(
     amplitude: Fraction,
     reach: Fraction,
     every: Fraction,
-    bandwidth: Fraction,
+    bandwidth: Fraction | None,
     margin: float,
     tick: Fraction | None,
     picture: str | None,
+    check: bool,
     write: bool,
 ) -> None:
     """Fits a model of the machine and computes gains for it."""
@@ -96,14 +123,22 @@ def tune(
         plant = tuner.identify_samples(times, commands, positions, tick_s)
     else:
         plant = tuner.identify(tuner.Record(*read_record(file), tick_s))
-    tuning = tuner.propose(plant, float(bandwidth), margin)
+    if check:
+        tuning = tuner.with_margins(plant, tuning_of(call.axis))
+    else:
+        assert bandwidth is not None, "contradiction() has seen to it"
+        tuning = tuner.propose(plant, float(bandwidth), margin)
     if picture:
         write_bytes(picture, tuner.picture(plant, tuning))
+    if check:
+        tuner.check(plant, tuning)
     if write:
         call.axis.set_tuning(tuning)
     gains = {name: tuning.real(name) for name in tuner.SCALES}
     resonance = f", resonance at {plant.resonance_hz:.0f} Hz" if plant.resonance_hz else ""
-    written = f"written to {call.where}" if write else "not written: add --write"
+    written = (
+        "in force" if check else f"written to {call.where}" if write else "not written: add --write"
+    )
     rows = [
         f"plant: {plant.gain:.4g} LSB per tick per command, "
         f"time constant {1e3 * plant.time_constant_s:.3g} ms, "
@@ -125,6 +160,20 @@ def tune(
             "written": write,
         },
         "\n".join(rows),
+    )
+
+
+def tuning_of(axis: Axis) -> tuner.Tuning:
+    """The gains and filters that an axis has."""
+    from moire.analysis import tune as tuner
+
+    gains, filters = axis.tuning()
+    return tuner.Tuning(
+        **gains,
+        filters=tuple((b0, b1, b2, a1, a2) for b0, b1, b2, a1, a2 in filters),
+        bandwidth_hz=0.0,
+        phase_margin_degree=0.0,
+        gain_margin=0.0,
     )
 
 

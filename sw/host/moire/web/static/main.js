@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page as a whole: the connection, the axes, the stop of all of them, and the plots.
+
+import { AxisView } from "./axis.js";
+import { releaseAll } from "./hold.js";
+import { Link } from "./link.js";
+import { ParameterTable } from "./parameters.js";
+import { History, Plot, QUANTITIES } from "./plot.js";
+
+const DRAW_MS = 80; // between two pictures of the plots
+const DESCRIBE_MS = 2000; // between two descriptions of them in words
+const at = (id) => document.getElementById(id);
+
+const views = new Map(); // axes by their names
+const histories = new Map();
+let mayChange = false;
+let beats = 0;
+
+const link = new Link({
+  open(server, names) {
+    mayChange = server.may_change;
+    at("access").hidden = true;
+    at("lost").hidden = true;
+    at("empty").hidden = names.length > 0;
+    at("stop").hidden = !mayChange || names.length === 0;
+    at("plots").hidden = names.length === 0;
+    document.body.classList.remove("stale");
+    document.querySelector(".keys").hidden = !mayChange;
+    setLink("connected", mayChange ? "connected" : "connected, read only");
+    if (names.join() !== [...views.keys()].join()) build(names);
+    for (const view of views.values()) {
+      view.mayChange(mayChange);
+      view.readLimits().catch((error) => view.fail(error, null));
+    }
+    parameters.open([...views.keys()], mayChange);
+    showServer(server);
+  },
+  lost(reason) {
+    releaseAll();
+    at("stop").hidden = true;
+    document.body.classList.add("stale");
+    setLink("lost", "not connected");
+    at("lost").hidden = false;
+    at("lost").textContent =
+      `The server is lost${reason ? ` (${reason})` : ""}: what is shown is old. What this page ` +
+      "moved is being stopped by the server or by the watchdog of the node. The page connects " +
+      "again as soon as it can.";
+  },
+  needsToken(refusal, wasGiven) {
+    setLink("token", "needs a token");
+    at("lost").hidden = true;
+    at("access").hidden = false;
+    at("access-text").textContent = wasGiven ? `${refusal.message}.` : "";
+    at("access").elements.token.focus();
+  },
+  samples(rows) {
+    for (const row of rows) {
+      const name = `${row.address}.${row.axis}`;
+      const view = views.get(name);
+      if (!view) continue;
+      view.show(row);
+      if (!row.error && !frozen) histories.get(name).add(row);
+    }
+  },
+  beat(server) {
+    showServer(server);
+    if (++beats % 2 === 0) {
+      for (const view of views.values()) view.readSpeed().catch(() => {});
+    }
+    if (views.size === 0 && beats % 2 === 0) link.lookAgain().catch(() => {});
+  },
+});
+const parameters = new ParameterTable(at("parameters"), link);
+
+function setLink(state, text) {
+  at("link").dataset.state = state;
+  at("link").textContent = text;
+}
+
+function showServer(server) {
+  at("speed").textContent =
+    server.speed === null ? "" : `simulated machine at ${server.speed.toFixed(2)} × real time`;
+}
+
+function build(names) {
+  views.clear();
+  histories.clear();
+  for (const name of names) {
+    views.set(name, new AxisView(name, link));
+    histories.set(name, new History());
+  }
+  at("axes").replaceChildren(...[...views.values()].map((view) => view.element));
+  at("legend").replaceChildren(
+    ...names.map((name, number) => {
+      const item = document.createElement("li");
+      item.className = `series-${(number % 4) + 1}`;
+      item.textContent = `axis ${name}`;
+      return item;
+    }),
+  );
+}
+
+// ------------------------------------------------------------------ stop
+
+function stopAll() {
+  releaseAll();
+  if (!mayChange) return;
+  for (const view of views.values()) view.stop();
+}
+
+at("stop").addEventListener("pointerdown", stopAll); // sooner than a click
+at("stop").addEventListener("click", (event) => event.detail === 0 && stopAll());
+for (const name of ["keydown", "keyup", "keypress"]) {
+  document.addEventListener(
+    name,
+    (event) => {
+      if (event.key !== " " || !mayChange) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      if (name === "keydown" && !event.repeat) stopAll();
+    },
+    true,
+  );
+}
+
+at("access").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const { token } = event.target.elements;
+  link.useToken(token.value.trim());
+  token.value = "";
+});
+
+// ------------------------------------------------------------------ plots
+
+const plots = QUANTITIES.map((quantity, index) => new Plot(quantity, index, at("charts")));
+let frozen = false;
+let drawn = 0;
+let described = -Infinity;
+
+at("freeze").addEventListener("click", () => {
+  frozen = !frozen;
+  at("freeze").setAttribute("aria-pressed", String(frozen));
+});
+
+function draw(now) {
+  requestAnimationFrame(draw);
+  if (now - drawn < DRAW_MS || at("plots").hidden) return;
+  drawn = now;
+  const ends = [...histories.values()].map((history) => history.rows.at(-1)?.[0] ?? 0);
+  const span = Number(at("span").value);
+  const end = Math.max(...ends);
+  for (const plot of plots) plot.draw(histories, end, span);
+  if (now - described < DESCRIBE_MS) return;
+  described = now;
+  for (const plot of plots) plot.describe(histories, end, span);
+}
+
+requestAnimationFrame(draw);
+link.connect();
