@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from moire.bus.protocol import Exchange, Timing
+from moire.bus.protocol import Exchange
 from moire.bus.transport import Transport
 
 
@@ -78,7 +78,7 @@ class Exchanges:
     def run(self, exchange: Exchange) -> Exchange:
         """Carries out an exchange to its end, successful or not, and returns it."""
         if not self.in_order:
-            self.wait_for_silence(exchange.timing)
+            self.wait_for_silence(exchange.timing.quiet)
         self.in_order = False
         self.statistics.exchanges += 1
         try:
@@ -89,8 +89,11 @@ class Exchanges:
         self.in_order = exchange.reply is not None
         return exchange
 
-    def wait_for_silence(self, timing: Timing) -> None:
-        """Throws away what still arrives."""
-        for _ in range(Exchange.LONGEST_NOISE):
-            if not self.transport.receive(1, timing.quiet):
-                return
+    def wait_for_silence(self, quiet_s: float) -> int:
+        """Throws away what still arrives, until nothing does for `quiet_s`; returns how many words
+        that were.
+        """
+        for count in range(Exchange.LONGEST_NOISE):
+            if not self.transport.receive(1, quiet_s):
+                return count
+        return Exchange.LONGEST_NOISE

@@ -76,6 +76,11 @@ class Bus:
 
     # requests
 
+    @property
+    def quiet_s(self) -> float:
+        """A bus on which nothing arrived for so long, in seconds, is silent."""
+        return max(0.01, 3 * self.transport.character_s)
+
     def exchange(
         self,
         address: int,
@@ -97,9 +102,8 @@ class Bus:
         else:
             sequence = self.random.randrange(256)
         self.sequences[address] = sequence
-        character_s = self.transport.character_s
         timing = Timing(
-            character_s, answer=answer_s or self.answer_s, quiet=max(0.01, 3 * character_s)
+            self.transport.character_s, answer=answer_s or self.answer_s, quiet=self.quiet_s
         )
         body = request_body(operation, sequence, **fields)
         exchange = Exchange(address, body, tries or self.tries, timing, self.transport.handshake)
@@ -153,6 +157,9 @@ class Bus:
             if identity.matches:
                 time_stamp = register_fields("node.time_stamp")[0].address(0)
                 self.request(address, "read_register", address=time_stamp)
+                # each of two repeated requests may have been answered by another one of them
+                if self.exchanges.wait_for_silence(self.quiet_s):
+                    raise BusGarbled(address, "words came after a whole reply", self.tries)
         return found
 
     def find_baud(
