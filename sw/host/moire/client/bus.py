@@ -56,6 +56,7 @@ class Bus:
 
     FIND_ANSWER_S = 0.05
     FIND_TRIES = 2
+    SINGLE_CHECKS = 3
 
     def __init__(
         self,
@@ -153,14 +154,21 @@ class Bus:
             except NoAnswer:
                 continue
             found.append(identity)
-            # two nodes with one address may identify themselves alike, but their times differ
             if identity.matches:
-                time_stamp = register_fields("node.time_stamp")[0].address(0)
-                self.request(address, "read_register", address=time_stamp)
-                # each of two repeated requests may have been answered by another one of them
-                if self.exchanges.wait_for_silence(self.quiet_s):
-                    raise BusGarbled(address, "words came after a whole reply", self.tries)
+                self.require_single(address)
         return found
+
+    def require_single(self, address: int) -> None:
+        """Raises BusGarbled when two nodes have this address.
+
+        They may identify themselves alike, but their times differ. A repeated request may by
+        chance be answered by one of them alone; the words of the other come after the reply.
+        """
+        time_stamp = register_fields("node.time_stamp")[0].address(0)
+        for _ in range(self.SINGLE_CHECKS):
+            self.request(address, "read_register", address=time_stamp)
+            if self.exchanges.wait_for_silence(self.quiet_s):
+                raise BusGarbled(address, "words came after a whole reply", self.tries)
 
     def find_baud(
         self, addresses: Iterable[int] = ADDRESSES, rates: Iterable[int] = RATES
