@@ -9,6 +9,8 @@ PYTHON := $(VENV)/bin/python
 SETUP  := $(VENV)/stamp
 JOBS   ?= 2
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+# each of the hundreds of simulations and commands imports what was compiled once
+export PYTHONDONTWRITEBYTECODE :=
 
 RTL      := $(shell find rtl -name '*.sv' | sort)
 LINTED   := $(RTL:%.sv=build/lint/%.ok)

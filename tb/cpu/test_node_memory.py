@@ -14,8 +14,9 @@ import pytest
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import ROOT, run, source_of
+from tb.bench import ROOT, run
 from tb.cpu.node_memory import NodeMemory
+from tb.simulator import source_of
 
 BYTES = 1024
 CONTENTS = [n * 0x9E3779B1 % (1 << 32) for n in range(BYTES // 4)]  # any words, all different

@@ -5,7 +5,8 @@ and our own tests are clean.
 
 import pytest
 
-from tb.bench import needs, results
+from tb.bench import needs
+from tb.simulator import results
 from tools import check_tests
 
 HEAD = """

@@ -9,7 +9,8 @@ import pytest
 
 from mutation import block, blocks, equivalence
 from mutation.block import Run, mutant_of, mutants_of
-from tb.bench import ROOT, of_mutants, source_of
+from tb.bench import ROOT
+from tb.simulator import of_mutants, source_of
 from twin.build import rtl_path
 
 LINE = (

@@ -15,9 +15,10 @@ import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge
 
-from tb.bench import needs, run, source_of, start
+from tb.bench import needs, run, start
 from tb.interpolate.arctan_iterative import ArctanIterative, arctan_rotation, latency, sample
 from tb.interpolate.phase_judge import close_calls, error, pairs_of_8_bits
+from tb.simulator import source_of
 
 IDLE = dict(valid=0, sin=0, cos=0)
 PLAN = arctan_rotation.ITERATIVE

@@ -11,9 +11,10 @@ import pytest
 from cocotb.triggers import FallingEdge
 
 from tables import arctan_quotient
-from tb.bench import needs, run, source_of, start
+from tb.bench import needs, run, start
 from tb.interpolate.arctan_quotient import LATENCY, ArctanQuotient, phase_of
 from tb.interpolate.phase_judge import error
+from tb.simulator import source_of
 
 IDLE = dict(valid=0, sin=0, cos=0)
 FULL = 1 << 15

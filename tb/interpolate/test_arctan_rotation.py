@@ -13,7 +13,8 @@ import pytest
 from cocotb.triggers import Timer
 
 from tables import arctan_rotation
-from tb.bench import run, source_of
+from tb.bench import run
+from tb.simulator import source_of
 
 
 @cocotb.test()

@@ -18,8 +18,9 @@ import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 
-from tb.bench import run, source_of, start
+from tb.bench import run, start
 from tb.interpolate.arctan_table import LATENCY, ArctanTable, arctan, phase_of
+from tb.simulator import source_of
 
 IDLE = dict(valid=0, sin=0, cos=0)
 

@@ -326,6 +326,6 @@ def test_the_readout_is_the_floor_of_the_true_position(subdivision):
 @pytest.mark.parametrize("w", [8, 12])
 def test_sine_cosine(w, monkeypatch):
     monkeypatch.setattr(
-        "tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
+        "tb.simulator.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
     )  # a bench top is not under rtl/
     run("interpolator_bench", __file__, W=w)

@@ -183,6 +183,6 @@ async def a_count_that_is_stuck_or_loses_edges_is_reported_when_it_is_half_a_per
 
 def test_tracking(monkeypatch):
     monkeypatch.setattr(
-        "tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
+        "tb.simulator.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
     )  # a bench top is not under rtl/
     run("tracking_bench", __file__)

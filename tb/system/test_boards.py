@@ -24,7 +24,8 @@ from boards.toml_file import Misfit
 from figures import synthesis
 from figures.boards import boards_failed
 from figures.synthesis import SynthesisError
-from tb.bench import ROOT, WAIVERS, package
+from tb.bench import ROOT
+from tb.simulator import WAIVERS, package
 from twin.build import rtl_path
 
 DESIGNS, TOO_LARGE = build.fitting()

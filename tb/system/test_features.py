@@ -17,7 +17,8 @@ from cocotb.triggers import FallingEdge
 from moire.client.built import FEATURES, parameter_of
 from moire.made.registers import FIELDS
 from tables import registers as tables
-from tb.bench import ROOT, package, run, source_of, start
+from tb.bench import ROOT, run, start
+from tb.simulator import package, source_of
 from twin.build import rtl_path
 
 ALL = 255
