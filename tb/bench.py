@@ -23,7 +23,6 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 
 ROOT = Path(__file__).resolve().parent.parent
-BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself
 
 
 def seed():
@@ -43,7 +42,7 @@ def run(top, test, **parameters):
     __tracebackhide__ = True
     from tb import simulator
 
-    simulator.run(top, test, **parameters)
+    simulator.run(top, test, seed(), parameters)
 
 
 def rtl_only(reason):

@@ -8,9 +8,9 @@ import math
 import pytest
 
 from tables import crossings
-from tb.bench import BENCHES
 from tb.common.test_synchroniser import test_synchroniser as synchroniser
 from tb.sense.test_axis_inputs import test_axis_inputs as axis_inputs
+from tb.simulator import BENCHES
 from twin.crossings import folders
 
 YEAR_S = 365 * 24 * 3600

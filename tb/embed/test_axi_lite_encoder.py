@@ -13,9 +13,10 @@ from cocotb.triggers import ClockCycles, FallingEdge
 from embed.amaranth_block import instance
 from embed.design import DesignError
 from embed.examples import axi_lite_encoder
-from tb.bench import BENCHES, run, start
+from tb.bench import run, start
 from tb.embed.encoder import Encoder
 from tb.registers.bus_masters import AxiLiteMaster, BusError
+from tb.simulator import BENCHES
 
 
 @cocotb.test()

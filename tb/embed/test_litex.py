@@ -16,11 +16,12 @@ from embed.litex_parts import FOLDER, NAME, is_there
 from firmware.build import stem_of
 from moire.bus.protocol import TO_NODE, ready_byte
 from moire.made.registers import MAP_CRC
-from tb.bench import BENCHES, ROOT, run, start
+from tb.bench import ROOT, run, start
 from tb.embed.encoder import Encoder
 from tb.embed.node_line import answer
 from tb.embed.registers_of import AxisRegisters
 from tb.registers.bus_masters import WishboneMaster
+from tb.simulator import BENCHES
 from twin import build as twin_build
 
 COUNT = 1 << 14  # of a position, in 2^-16 period

@@ -15,8 +15,9 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from moire.made import bus_tables
 from moire.made import registers as host
 from tables import registers as tables
-from tb.bench import BENCHES, ROOT, rtl_only, run, start
+from tb.bench import ROOT, rtl_only, run, start
 from tb.registers.register_block import WORD, RegisterBlock
+from tb.simulator import BENCHES
 
 
 def needs_of(block):

@@ -6,6 +6,7 @@ import zlib
 import numpy
 import pytest
 
+from moire.bus.transport import Transport
 from twin import Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
 from twin.nodes.twin import CLK_HZ
 
@@ -23,6 +24,12 @@ def twin():
     with Twin(seed=1) as made:
         made.run_until_ready()
         yield made
+
+
+def test_its_transport_does_what_every_transport_of_the_host_package_does(twin):
+    """The twin runs without the host package, so its transport inherits nothing."""
+    promised = {name for name in dir(Transport) if not name.startswith("_")}
+    assert promised <= set(dir(TwinTransport(twin)))
 
 
 def poll(twin, address=1, **damage):

@@ -588,6 +588,10 @@ class TwinTransport(Transport):
         """Whether this address can be called: all can."""
         return True
 
+    def speed(self) -> float | None:
+        """None: there is no server that could say how fast the twin runs."""
+        return None
+
     def set_baud(self, baud: float) -> None:
         """Change the baud rate of the host."""
         self.twin.set_host_baud(baud)
