@@ -119,7 +119,7 @@ def s0_fine_drift_nm_rms(drift_s: float = DRIFT_S, seed: int = SEED) -> float:
     return float(np.sqrt((found**2).mean()))
 
 
-FEW = Quick({"count": 4}, "four moves")
+FEW = Quick({"count": 3}, "three moves")
 
 
 FIGURES = {

@@ -206,7 +206,7 @@ FIGURES = {
         "crashes in coverage-guided fuzzing of the parsers of host and firmware, the firmware's "
         f"under sanitizers, {FUZZ_S // 60} minutes",
         "0",
-        Quick({"seconds": 4}, "4 seconds"),
+        Quick({"seconds": 2}, "2 seconds"),
         0,
     ),
 }

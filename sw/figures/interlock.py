@@ -286,7 +286,7 @@ FIGURES = {
         "of 10^4 faults in random cycles, 300 of them in the whole node: drive not off within a "
         "servo tick, wrong first cause or position, or reset without a person",
         "0",
-        Quick({"faults": 208, "in_node": 6, "in_core": 2}, "208 faults, 8 of them in the node"),
+        Quick({"faults": 208, "in_node": 3, "in_core": 1}, "208 faults, 4 of them in the node"),
         0,
     ),
 }
