@@ -11,7 +11,8 @@ A command is a line of an indented or `sh` code block that begins with `moire`, 
 - `moire twin` serves until the next one, an experiment or the end of the page, and what would run
   for ever is ended by Ctrl-C;
 - targets of make that would call the tests again, or need tens of minutes, are only resolved
-  (`make -n`); experiments are ended after LONGEST_S unless --whole is given.
+  (`make -n`); so are those of some minutes, and experiments are ended after LONGEST_S, unless
+  --whole is given.
 
     python -m tools.docs_commands [--whole] [PAGE …]       exit code 1 when a command fails
 """
@@ -40,6 +41,7 @@ RESOLVED_ONLY = re.compile(r"make (test$|check|figures|soak|board|litex|gowin|ch
 ENDLESS = re.compile(r"moire\b.* (watch|serve)\b|moire (watch|serve)\b")
 SERVER = re.compile(r"moire\b.* serve$")  # any free ports: the served twin may have the usual ones
 EXPERIMENT = re.compile(r"build/venv/bin/python -m experiments\.")
+RESOLVED_IN_SHORT = re.compile(r"make (demo|format|test K)")  # unless the whole is asked for
 LONGEST_S = 4  # of an experiment, unless the whole is asked for
 ENDLESS_S = 4  # of a command that only Ctrl-C ends
 PATIENCE_S = 600  # of every other command
@@ -142,7 +144,7 @@ class Session:
             self.need_port()
         if words.startswith("pip install"):
             words = words.replace("install", "install --dry-run --no-deps --no-build-isolation")
-        if words.startswith("make") and RESOLVED_ONLY.match(words):
+        if RESOLVED_ONLY.match(words) or not self.whole and RESOLVED_IN_SHORT.match(words):
             words = words.replace("make", "make -n", 1)
         if SERVER.match(words):
             words += " --http 0 --rfc2217 0 --tcp 0"
@@ -246,7 +248,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("pages", nargs="*", metavar="PAGE", help="a Markdown file; all without one")
-    parser.add_argument("--whole", action="store_true", help="let every experiment end by itself")
+    parser.add_argument("--whole", action="store_true", help="run what takes minutes, too")
     options = parser.parse_args()
     chosen = [read(Path(name).resolve()) for name in options.pages] or pages()
     count = 0

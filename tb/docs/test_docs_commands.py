@@ -6,11 +6,12 @@ import pytest
 
 from tools import docs_commands
 
-# README calls the tests themselves: only `make figure NAME=docs_commands_failed` runs it.
-PAGES = [page for page in docs_commands.pages() if page.path != docs_commands.ROOT / "README.md"]
+PAGES = docs_commands.pages()
 
 
-@pytest.mark.parametrize("page", PAGES, ids=[page.path.stem for page in PAGES])
+@pytest.mark.parametrize(
+    "page", PAGES, ids=[str(page.path.relative_to(docs_commands.ROOT)) for page in PAGES]
+)
 def test_every_command_of_the_page_does_what_is_printed(page):
     assert docs_commands.failures(page) == []
 
