@@ -140,7 +140,14 @@ class Bus:
         self.lists: dict[str, dict[str, tuple[int, str]]] = {
             name: {key: tuple(value) for key, value in table[name].items()} for name in LISTS
         }
-        self.operations: Entries = table["operation"]
+        self.constants: dict[str, tuple[int, str]] = {
+            name: (value, words) for name, (value, words) in table["constant"].items()
+        }
+        numbers = {name: value for name, (value, _) in self.constants.items()}
+        self.operations: Entries = {
+            name: {**operation, "text": with_numbers(operation["text"], numbers)}
+            for name, operation in table["operation"].items()
+        }
         self.parameters: Entries = table["parameter"]
         self.settings: Entries = table["setting"]
         self.values_crc = zlib.crc32(
@@ -203,6 +210,14 @@ class Bus:
             Fraction(parameter["lsb"])
 
 
+def with_numbers(text: str, numbers: Mapping[str, int]) -> str:
+    """The text with the values of the constants that it names in braces."""
+    try:
+        return text.format_map(numbers)
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"bus.toml: '{text}' names no constant: {error}") from None
+
+
 def once(what: str, numbers: Sequence[object]) -> None:
     if len(set(numbers)) != len(numbers):
         raise ValueError(f"bus.toml: {what} repeat")
@@ -240,6 +255,9 @@ def header(bus: Bus) -> str:
         f"#define BUS_REPLY_HEAD      {fields(REPLY_HEAD, [])[1]}u  // sequence, operation, cause",
         "",
     ]
+    for name, (number, words) in bus.constants.items():
+        out += commented(f"#define BUS_{name.upper()} {number}u", words)
+    out.append("")
     for name, entries in bus.lists.items():
         out.append(f"enum bus_{name} {{" + ("" if name in CODES else "    // bits"))
         for key, (code, words) in entries.items():
@@ -381,6 +399,8 @@ def host(bus: Bus) -> str:
         f"VERSION = {bus.version}",
         f"LONGEST_BODY = {bus.longest_body}",
         "",
+        *(f"{name.upper()} = {value}  # {words}" for name, (value, words) in bus.constants.items()),
+        "",
     ]
     for name, entries in bus.lists.items():
         out.append(f"# {'code' if name in CODES else 'bit'}: (name, words)")
@@ -479,6 +499,9 @@ def page_parts(bus: Bus) -> dict[str, list[str]]:
         f"Version {bus.version}, CRC-32 of `tables/bus.toml` `{bus.crc:08X}`, "
         f"longest body {bus.longest_body} bytes."
     ]
+    rows: list[tuple[object, ...]]
+    rows = [(f"`{name}`", *entry) for name, entry in bus.constants.items()]
+    parts["constants"] = table(("constant", "value", "meaning"), rows)
     overview = [
         (operation["code"], f"[`{name}`](#{name})", operation["text"])
         for name, operation in bus.operations.items()
@@ -500,7 +523,6 @@ def page_parts(bus: Bus) -> dict[str, list[str]]:
             + diagram(reply)
         )
     parts["operations"] = body
-    rows: list[tuple[object, ...]]
     for name, entries in bus.lists.items():
         rows = [(code, f"`{key}`", words) for key, (code, words) in entries.items()]
         parts[name + "s"] = table(("code" if name in CODES else "bit", "name", "words"), rows)

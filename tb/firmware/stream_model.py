@@ -7,8 +7,6 @@ All lengths are 2^-40 period; a piece is (velocity, acceleration, jerk, ticks, l
 
 from math import comb
 
-SHORTEST, LONGEST = 2, 256  # ticks between two set-points
-
 
 def towards_zero(dividend, divisor):
     """The quotient, rounded towards zero."""

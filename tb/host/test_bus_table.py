@@ -94,6 +94,22 @@ def test_the_host_has_every_entry_of_the_source():
         )
 
 
+def test_each_constant_has_its_value_in_the_header_the_host_and_the_words():
+    constants = {name: value for name, (value, _) in TABLE["constant"].items()}
+    for name, value in constants.items():
+        assert re.search(rf"^#define BUS_{name.upper()} {value}u\b", HEADER, re.MULTILINE)
+        assert getattr(bus_tables, name.upper()) == value
+    assert " 2 to 256 after the one before" in bus_tables.OPERATIONS["set_point"].text
+    assert "{" not in "".join(operation.text for operation in bus_tables.OPERATIONS.values())
+
+
+@pytest.mark.parametrize("word", ["{stream_widest}", "{stream_shortest"])
+def test_a_word_in_braces_that_is_no_constant_is_refused(word):
+    text = SOURCE.read_text(encoding="utf-8").replace("{stream_shortest}", word)
+    with pytest.raises(ValueError, match=r"bus\.toml: 'append a set-point.*' names no constant"):
+        generator.Bus(text.encode())
+
+
 def test_offsets_and_lengths_in_the_header_match_a_packed_struct():
     formats = {
         "u8": "B",

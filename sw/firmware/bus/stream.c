@@ -24,15 +24,11 @@
 #include "made/bus_protocol.h"
 #include "planner/plan.h"
 
-#define PIECES 2u       // of a set-point
-#define SHORTEST 2u     // ticks between two set-points
-#define LONGEST 256u    // of both pieces
-#define MOST_LATE 400u  // ticks
+#define PIECES 2u  // of a set-point
 #define FARTHEST \
-    ((int64_t)1 << 32)      // 2^-16 period between two set-points: all products fit into 64 bits
-#define TOLERANCE_SHIFT 10  // limits may be exceeded by 2^-10, for rounded positions
-#define TAIL_MORE 4u        // ticks of the last piece beyond the longest time without a poll
-#define LONGEST_TAIL 200u   // ticks of a piece that can be measured
+    ((int64_t)1 << 32)     // 2^-16 period between two set-points: all products fit into 64 bits
+#define TAIL_MORE 4u       // ticks of the last piece beyond the longest time without a poll
+#define LONGEST_TAIL 200u  // ticks of a piece that can be measured
 
 static struct stream {
     bool open;
@@ -87,7 +83,7 @@ static uint8_t begin_stream(unsigned n) {
     const uint32_t late_limit = (uint32_t)bus_request_field(BUS_BEGIN_STREAM_REQUEST_LATE_LIMIT, 2);
     const int64_t base = axis_read_position(n, AXIS_TARGET);
     uint32_t ticks;
-    if (late_limit > MOST_LATE) return BUS_CAUSE_OUT_OF_RANGE;
+    if (late_limit > BUS_STREAM_LATEST) return BUS_CAUSE_OUT_OF_RANGE;
     const uint8_t cause = axis_prepare(n, base, &ticks);  // a motion of no distance
     if (cause != BUS_CAUSE_OK) return cause;
     streams[n] = (struct stream){.open = true, .late_limit = (uint16_t)late_limit, .base = base};
@@ -98,8 +94,9 @@ static uint8_t begin_stream(unsigned n) {
 // an end or where the acceleration changes its sign.
 static bool within(const struct planner_limits* limits, const struct planner_progress* at,
                    uint32_t ticks) {
-    const uint64_t velocity = limits->velocity + (limits->velocity >> TOLERANCE_SHIFT),
-                   acceleration = limits->acceleration + (limits->acceleration >> TOLERANCE_SHIFT);
+    const uint64_t velocity = limits->velocity + (limits->velocity >> BUS_STREAM_TOLERANCE),
+                   acceleration =
+                       limits->acceleration + (limits->acceleration >> BUS_STREAM_TOLERANCE);
     const int64_t first = at->state.acceleration, last = first + at->jerk * (ticks - 1);
     if (size(first) > acceleration || size(last) > acceleration) return false;
     if ((first < 0) == (last < 0)) return true;
@@ -121,11 +118,11 @@ static uint8_t set_point(unsigned n) {
     if (position < parameters_get(n, BUS_PARAMETER_TRAVEL_LOW) ||
         position > parameters_get(n, BUS_PARAMETER_TRAVEL_HIGH))
         return BUS_CAUSE_OUT_OF_TRAVEL;
-    if ((int32_t)ticks < (int32_t)SHORTEST) {
+    if ((int32_t)ticks < (int32_t)BUS_STREAM_SHORTEST) {
         s->late++;
         return BUS_CAUSE_SET_POINT_LATE;
     }
-    if (ticks > LONGEST) return BUS_CAUSE_OUT_OF_RANGE;
+    if (ticks > BUS_STREAM_LONGEST) return BUS_CAUSE_OUT_OF_RANGE;
     if (motion_room(n) < PIECES) return BUS_CAUSE_QUEUE_FULL;
 
     const struct planner_limits limits = parameters_limits(n, BUS_PARAMETER_VELOCITY);

@@ -3,11 +3,17 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x6C7E749Bu    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x51F95794u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
 #define BUS_REPLY_HEAD      3u  // sequence, operation, cause
+
+#define BUS_STREAM_SHORTEST 2u    // fewest ticks from one set-point of a stream to the next
+#define BUS_STREAM_LONGEST 256u    // most ticks from one set-point of a stream to the next
+#define BUS_STREAM_LATEST 400u    // largest late_limit, in ticks
+// bits b: a stream may exceed its limits by 2^-b of them, for rounding
+#define BUS_STREAM_TOLERANCE 10u
 
 enum bus_cause {
     BUS_CAUSE_OK = 0,    // done

@@ -41,6 +41,7 @@ from moire.made.bus_tables import (
     CALIBRATION_REASONS,
     FAULTS,
     SIGNAL_FAULTS,
+    STREAM_LATEST,
 )
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
 HARMONICS = 10  # orders of phase error that are corrected
 REACT_S = 0.3  # that a program needs to notice that its motion was stopped, and to end
 SCATTER = 1 << 20  # counts of the calibration's scatter in one signal period
-MOST_LATE_TICKS = 400  # that a stream may extrapolate
 PROGRESS_S = 0.02  # a stream reports its progress only while its queue lasts longer
 OUTPUTS = ("bridge", "stepper", "dac", "fine_stage")  # in the order of the parameter drive
 CORRECTION = ("sin_offset", "cos_offset", "gain", "quadrature_error")
@@ -216,9 +216,9 @@ class Axis(AxisParameters, AxisCapture):
             raise
         tick_hz = self.node.identity.tick_hz
         late_ticks = round(units.parse_time(late_limit) * tick_hz)
-        if not 0 <= late_ticks <= MOST_LATE_TICKS:
+        if not 0 <= late_ticks <= STREAM_LATEST:
             given = units.format_time(units.parse_time(late_limit))
-            most = units.format_time(Fraction(MOST_LATE_TICKS, tick_hz))
+            most = units.format_time(Fraction(STREAM_LATEST, tick_hz))
             raise OutOfRange(f"the late limit is {given}; allowed is 0 to {most}")
         streams.check_limits(path, self.stream_limits())
         wire = streams.set_points(path, self.period_nm, tick_hz)

@@ -7,7 +7,7 @@
         axis.stream(read_points("path.csv"))
 
 Between two points the target follows the cubic that has their positions and velocities. The node
-computes it; the host sends it a point of that cubic at least every 64 ms.
+computes it; the host sends it a point of that cubic every STREAM_LONGEST ticks or more often.
 """
 
 import re
@@ -20,11 +20,10 @@ from pathlib import Path
 from moire import units
 from moire.columns import number, rows
 from moire.errors import BadFile, OutOfRange, UnitError
+from moire.made.bus_tables import STREAM_LONGEST, STREAM_SHORTEST, STREAM_TOLERANCE
 
-SHORTEST_TICKS = 2  # between two set-points
-LONGEST_TICKS = 256
 FINE = 1 << 40  # units of a velocity on the bus in a period per tick
-TOLERANCE = Fraction(1, 1024)  # of the node's limits, for rounded positions
+TOLERANCE = Fraction(1, 1 << STREAM_TOLERANCE)  # of the node's limits
 REMEDY = "its firmware plays no streams; build the image stream (docs/stream.md)"
 NO_NUMBERS = ("nan", "inf", "infinity")  # which a plain number may be, too
 COLUMNS = (  # of a file, with the units of plain numbers
@@ -139,7 +138,7 @@ def set_points(points: Sequence[Point], period_nm: Fraction, tick_hz: int) -> li
     """What is sent for a path, from the second point on; the first is where the axis is at rest.
 
     A time that is no whole number of ticks is rounded, and the set-point is where the path is at
-    that tick. Raises OutOfRange if two points are less than two ticks apart.
+    that tick. Raises OutOfRange if two points are fewer than STREAM_SHORTEST ticks apart.
     """
     found: list[SetPoint] = []
     start, end = points[0].time_s, points[-1]
@@ -148,13 +147,13 @@ def set_points(points: Sequence[Point], period_nm: Fraction, tick_hz: int) -> li
     for n, cubic in enumerate(cubics):
         begin, until = tick, round((cubic.end.time_s - start) * tick_hz)
         ticks = until - begin
-        if ticks < SHORTEST_TICKS:
+        if ticks < STREAM_SHORTEST:
             raise OutOfRange(
                 f"{named(cubic.end)}: it is {units.format_time(cubic.time)} after the point "
-                f"before; points must be {units.format_time(Fraction(SHORTEST_TICKS, tick_hz))} "
+                f"before; points must be {units.format_time(Fraction(STREAM_SHORTEST, tick_hz))} "
                 "apart at least"
             )
-        parts = -(-ticks // LONGEST_TICKS)
+        parts = -(-ticks // STREAM_LONGEST)
         for part in range(1, parts + 1):
             tick = begin + ticks * part // parts
             time = start + Fraction(tick, tick_hz)

@@ -24,9 +24,14 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x6C7E749B
+PROTOCOL_CRC = 0x51F95794
 VERSION = 1
 LONGEST_BODY = 64
+
+STREAM_SHORTEST = 2  # fewest ticks from one set-point of a stream to the next
+STREAM_LONGEST = 256  # most ticks from one set-point of a stream to the next
+STREAM_LATEST = 400  # largest late_limit, in ticks
+STREAM_TOLERANCE = 10  # bits b: a stream may exceed its limits by 2^-b of them, for rounding
 
 # code: (name, words)
 CAUSES = {
