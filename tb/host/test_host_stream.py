@@ -161,6 +161,15 @@ def test_a_path_of_many_points_is_played_while_it_is_sent():
     assert node.ask("stream", axis=0)["late"] == 0
 
 
+@pytest.mark.parametrize("points", [4, 60])
+def test_a_stream_is_started_once_when_its_queue_is_full_or_complete(points):
+    node = node_of()
+    axis_of(node).stream(points_of(arc(points, mm=0.01)))
+    assert node.executed.count("start") == 1
+    before = node.executed[: node.executed.index("start")]
+    assert before.count("set_point") == min(points, 8)
+
+
 def test_the_axis_moves_to_the_first_point_first():
     node = node_of()
     axis_of(node).stream(points_of(["5, 0.1, 0", "105, 0.105, 0"]), late_limit=0)

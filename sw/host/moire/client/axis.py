@@ -243,17 +243,19 @@ class Axis(AxisParameters, AxisCapture):
 
     def feed(self, wire: Sequence[streams.SetPoint], progress: Progress | None) -> None:
         """Sends the set-points of a stream, as the queue has room; starts it when that is full."""
-        started = False
-        room = 1
-        for n, set_point in enumerate(wire):
-            while room == 0:
-                if not started:
-                    self.node.request("start", axes=1 << self.number)
-                    started = True
-                room = self.room_of_stream(progress)
-            room = self.send(set_point, last=n == len(wire) - 1)
-        if not started:
-            self.node.request("start", axes=1 << self.number)
+        sent = self.fill(wire, 0, 1)
+        self.node.request("start", axes=1 << self.number)
+        while sent < len(wire):
+            sent = self.fill(wire, sent, self.room_of_stream(progress))
+
+    def fill(self, wire: Sequence[streams.SetPoint], sent: int, room: int) -> int:
+        """Sends set-points while the queue has room, from the one after the first `sent` on;
+        returns how many are sent then.
+        """
+        while room and sent < len(wire):
+            room = self.send(wire[sent], last=sent == len(wire) - 1)
+            sent += 1
+        return sent
 
     def send(self, set_point: streams.SetPoint, last: bool) -> int:
         """Sends a set-point; returns for how many more the queue has room. A refusal ends the
