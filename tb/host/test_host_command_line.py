@@ -80,6 +80,26 @@ def test_drives_are_switched_off_after_an_error_too():
     assert not node.axes[0].enabled
 
 
+@pytest.mark.parametrize(
+    "command", ["move 1mm", "move 1mm --no-wait", "move 1mm --by", "prepare 1mm"]
+)
+def test_a_move_of_an_axis_that_is_not_homed_is_refused_before_its_drive_is_switched_on(command):
+    node = BusNode()
+    named = command.partition(" ")[0]
+    refused = f"moire: node 1 refused '{named}': the axis has no zero yet: home it first\n"
+    call = Call(command, node)
+    assert (call.code, call.err) == (1, refused) and "enable" not in node.executed
+    on = Call(f"enable -- {command}", BusNode())
+    assert (on.code, on.err) == (1, refused)  # in the words of the node
+
+
+def test_a_faulted_axis_that_is_not_homed_is_refused_for_its_fault():
+    node = BusNode()
+    node.axes[0].causes = FAULT["estop"]
+    node.run(1)
+    assert "a fault is latched" in sentence(Call("move 1mm", node), 1)
+
+
 def test_options_of_the_first_command_hold_for_all_and_may_be_given_again():
     nodes = BusNode(1), BusNode(2, axes=2)
     call = Call(

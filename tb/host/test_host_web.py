@@ -108,6 +108,18 @@ def test_a_stage_is_homed_moved_and_read_in_units(served):
         assert served.node.parameter("velocity") == 8750
 
 
+@pytest.mark.parametrize("path, body", [("move", {"to": "1 um"}), ("jog", {"by": "1 um"})])
+def test_a_motion_of_an_axis_that_is_not_homed_leaves_its_drive_off(path, body):
+    served = Served(BusNode())
+    try:
+        with served.http() as client:
+            status, answer = client.ask("POST", f"{AXIS}/{path}", body)
+        assert status == 409 and "refused 'move': the axis has no zero yet" in json.dumps(answer)
+        assert "enable" not in served.node.executed
+    finally:
+        served.end()
+
+
 def test_a_fault_comes_with_its_meaning_and_what_to_do(served):
     with served.http() as client:
         client.done("POST", f"{AXIS}/enable")

@@ -175,13 +175,16 @@ class Call:
         """The time of the port, in seconds."""
         return float(self.bus.transport.now())
 
-    def switch_on(self) -> Axis:
+    def switch_on(self, motion: str = "") -> Axis:
         """The axis with its drive on. If this call has switched it on, it also switches it off at
-        its end.
+        its end. A `motion` is one that needs a zero: see Axis.enable_for().
         """
         axis, place = self.axis, (self.options.address, self.options.axis)
         if not axis.status().enabled:
-            axis.enable()
+            if motion:
+                axis.enable_for(motion)
+            else:
+                axis.enable()
             self.session.switched_on[place] = axis
         self.session.used[place] = axis
         return axis

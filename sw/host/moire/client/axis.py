@@ -13,7 +13,7 @@ from moire.client import calibration, index_survey
 from moire.client import stream as streams
 from moire.client.access import COUNTS, FULL_SCALE
 from moire.client.capture import AxisCapture
-from moire.client.names import CAUSE_CODES, bit_names, code_name, descriptions
+from moire.client.names import CAUSE_CODES, bit_names, code_name, descriptions, refusal
 from moire.client.parameters import TRAVEL, AxisParameters
 from moire.client.records import (
     CalibrationState,
@@ -97,6 +97,16 @@ class Axis(AxisParameters, AxisCapture):
         """Switches the drive on; raises Refused while a fault is latched."""
         self.request("enable", on=1)
         self.node.switched_on.add(self.number)
+
+    def enable_for(self, motion: str) -> None:
+        """Switches the drive on for a "move" or "prepare". An axis without a zero is refused in the
+        words of the node, and its drive stays off.
+        """
+        status = self.status()
+        can_be_on = not status.faults and self.built().has("drive")  # else the node says why
+        if not status.homed and can_be_on:
+            raise refusal(self.node.address, motion, CAUSE_CODES["not_homed"])
+        self.enable()
 
     def disable(self) -> None:
         """Switches the drive off at once, without a stop."""

@@ -19,11 +19,10 @@ from moire.bus.exchanges import Exchanges
 from moire.bus.protocol import ADDRESSES, Exchange, Reply, Timing, request_body, sync_words
 from moire.bus.transport import BAUD, Transport
 from moire.client.axis import Axis
-from moire.client.names import code_name, descriptions
+from moire.client.names import refusal
 from moire.client.node import Node, register_fields
 from moire.client.records import Identity, Progress, Status
-from moire.errors import BusError, BusGarbled, NoAnswer, OutOfRange, PortError, Refused
-from moire.made.bus_tables import CAUSES
+from moire.errors import BusError, BusGarbled, NoAnswer, OutOfRange, PortError
 
 SYNC_S = 0.002  # after this time the firmware, too, knows what the sync began
 BAUD_CHANGE_S = 0.005  # a node changes its rate after its reply, at most this much later
@@ -299,9 +298,4 @@ def accepted(reply: Reply, address: int, operation: str) -> dict[str, int]:
     """The fields of a reply; raises Refused unless its cause is ok."""
     if reply.cause == 0:
         return reply.fields
-    cause = code_name(CAUSES, reply.cause, "cause")
-    raise Refused(
-        cause,
-        reply.cause,
-        f"node {address} refused '{operation}': {descriptions(CAUSES, [cause])}",
-    )
+    raise refusal(address, operation, reply.cause)

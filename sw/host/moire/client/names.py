@@ -6,6 +6,7 @@ Every table is one of moire.made.bus_tables: a code or a bit number, its name, i
 
 from collections.abc import Iterable, Mapping
 
+from moire.errors import Refused
 from moire.made.bus_tables import CAUSES
 
 Table = Mapping[int, tuple[str, str]]
@@ -31,3 +32,10 @@ def descriptions(table: Table, names: Iterable[str]) -> str:
     """The descriptions that belong to these names, separated by commas."""
     known = dict(table.values())
     return ", ".join(known.get(name, name) for name in names)
+
+
+def refusal(address: int, operation: str, code: int) -> Refused:
+    """The error for an operation that a node refuses with the cause of this code."""
+    cause = code_name(CAUSES, code, "cause")
+    words = descriptions(CAUSES, [cause])
+    return Refused(cause, code, f"node {address} refused '{operation}': {words}")

@@ -275,7 +275,9 @@ async def take(call: Call) -> Values:
     return status_of(call, await bridge.status(call.place))
 
 
-async def begun(call: Call, begin: Callable[[Axis], Result]) -> tuple[Result, Axis]:
+async def begun(
+    call: Call, begin: Callable[[Axis], Result], switch_on: Callable[[Axis], None]
+) -> tuple[Result, Axis]:
     """Switches the drive on if it is off, and begins a motion. Whoever else moves the axis is
     stopped if asked. A stop that anybody sends meanwhile is ahead of the motion in the queue, so
     that it holds for this motion, too.
@@ -285,7 +287,7 @@ async def begun(call: Call, begin: Callable[[Axis], Result]) -> tuple[Result, Ax
         await take(call)
     stops = bridge.gateway.stops[place]
     if not (await bridge.status(place)).status.enabled:
-        await call.command(lambda axis: axis.enable())
+        await call.command(switch_on)
         if bridge.gateway.stops[place] != stops:
             await bridge.ask_at_once(call.client, place, "enable", on=0)
             raise was_stopped()
@@ -303,9 +305,16 @@ def was_stopped() -> Refused:
     )
 
 
-async def motion(call: Call, begin: Callable[[Axis], float | None]) -> Values:
+def enable_for_move(axis: Axis) -> None:
+    """Switches the drive on for a motion that needs a zero."""
+    axis.enable_for("move")
+
+
+async def motion(
+    call: Call, begin: Callable[[Axis], float | None], switch_on: Callable[[Axis], None]
+) -> Values:
     """Begins a motion and, unless told otherwise, waits for its end."""
-    seconds, axis = await begun(call, begin)
+    seconds, axis = await begun(call, begin, switch_on)
     call.bridge.end_jogs(call.place)
     if not call.given.get("wait", True):
         return begun_values(call, await call.bridge.status(call.place), seconds)
@@ -328,7 +337,9 @@ async def move(call: Call) -> Values:
             "a motion needs 'to' or 'by', one of them",
             'write {"to": "1.5 mm"}, or {"by": "-50 um"}',
         )
-    return await motion(call, lambda axis: axis.begin_move(to or by, by=by is not None))
+    return await motion(
+        call, lambda axis: axis.begin_move(to or by, by=by is not None), enable_for_move
+    )
 
 
 async def jog(call: Call) -> Values:
@@ -348,7 +359,7 @@ async def jog(call: Call) -> Values:
         return axis.begin_move(nm=min(max(target, low), high))
 
     try:
-        seconds, _ = await begun(call, begin)
+        seconds, _ = await begun(call, begin, enable_for_move)
     except BaseException:
         made.end()
         raise
@@ -376,7 +387,7 @@ async def home(call: Call) -> Values:
             axis.set_parameter("home_method", call.given["method"])
         axis.request("home")
 
-    return await motion(call, begin)
+    return await motion(call, begin, Axis.enable)
 
 
 # ------------------------------------------------------------------ parameters

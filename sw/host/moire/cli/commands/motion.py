@@ -69,10 +69,10 @@ def move(call: Call, target: Fraction, by: bool, no_wait: bool, take: bool) -> N
     if take:
         call.axis.take_over()
     if no_wait:
-        seconds = call.switch_on().begin_move(nm=target, by=by)
+        seconds = call.switch_on("move").begin_move(nm=target, by=by)
         say_duration(call, "on its way", seconds)
     else:
-        run_motion(call, lambda axis, show: axis.move(nm=target, by=by, progress=show))
+        run_motion(call, lambda axis, show: axis.move(nm=target, by=by, progress=show), "move")
 
 
 @moire.command(
@@ -94,7 +94,7 @@ def finish(call: Call) -> None:
 @BY
 def prepare(call: Call, target: Fraction, by: bool) -> None:
     """The axis does not move yet."""
-    seconds = call.switch_on().prepare(nm=target, by=by)
+    seconds = call.switch_on("prepare").prepare(nm=target, by=by)
     say_duration(call, "prepared", seconds)
 
 
@@ -181,10 +181,12 @@ def resume(call: Call) -> None:
 
 
 def run_motion(
-    call: Call, motion: Callable[[Axis, Callable[[Status], None] | None], Status]
+    call: Call, motion: Callable[[Axis, Callable[[Status], None] | None], Status], name: str = ""
 ) -> None:
-    """Carry out a motion of an axis whose drive is on, and say where it ended."""
-    axis, show = call.switch_on(), call.progress()
+    """Carry out a motion of an axis whose drive is on, and say where it ended. It has a name if it
+    needs a zero.
+    """
+    axis, show = call.switch_on(name), call.progress()
     began = call.now()
     try:
         status = motion(axis, show)
