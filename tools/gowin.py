@@ -8,11 +8,17 @@ import sys
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parents[1] / "build" / "gowin"
+COMMAND = (sys.executable, Path(__file__).resolve())  # and the name of a tool
+
+
+def present() -> bool:
+    """Whether `make gowin` has been run to its end."""
+    return (FOLDER / "stamp").is_file()
 
 
 def main() -> None:
     name = sys.argv[1] if len(sys.argv) > 1 else ""
-    if not (FOLDER / "stamp").is_file():
+    if not present():
         sys.exit("ERROR: the tools for Gowin parts are missing: make gowin gets them")
     program = FOLDER / "bin" / name
     if not program.is_file():

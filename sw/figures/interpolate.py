@@ -10,6 +10,7 @@ from figures.synthesis import (
     ECP5,
     ECP5_CELLS,
     ELABORATED,
+    NEXTPNR_ECP5,
     elaborated,
     mhz_words,
     netlist_of,
@@ -38,7 +39,7 @@ def interpolate_ecp5_mhz(place: bool = True, seed: int = SEED) -> float:
         return elaborated(BENCH, {"W": W})
     netlist = netlist_of(BENCH, {"W": W}, "ecp5", 1)
     alone = "--lpf-allow-unconstrained", "--out-of-context"
-    tries = placements(netlist, "ecp5", ECP5, 110, seed, *alone)
+    tries = placements(netlist, NEXTPNR_ECP5, ECP5, 110, seed, *alone)
     used = tries[0][1]
     console.print(
         "filter, correction, arctan, harmonics, tracker, position: "

@@ -14,6 +14,7 @@ from campaigns.campaign import Campaign
 from figures.common import Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import (
     ELABORATED,
+    NEXTPNR_ICE40,
     UP5K,
     elaborated,
     mhz_words,
@@ -97,7 +98,7 @@ def relay_edge_mhz(edges: int = SHARE, rates: Sequence[float] = RATES_MHZ, seed:
 @cache
 def up5k(first: int) -> dict[str, float]:
     netlist = netlist_of(source_of("relay"), {"K": 16}, "ice40", 1)
-    tries = placements(netlist, "ice40", UP5K, 24, first, "--pcf-allow-unconstrained")
+    tries = placements(netlist, NEXTPNR_ICE40, UP5K, 24, first, "--pcf-allow-unconstrained")
     console.print(f"placements: {mhz_words(tries)}")
     fmax, used = min(tries, key=lambda one: one[0])
     part = {

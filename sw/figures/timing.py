@@ -19,7 +19,16 @@ from campaigns.campaign import Campaign, Counts, Result
 from campaigns.store import Store
 from campaigns.version import commit, version
 from figures import area
-from figures.synthesis import BUILD, ECP5, UP5K, netlist_of, placed, source_of
+from figures.synthesis import (
+    BUILD,
+    ECP5,
+    NEXTPNR_ECP5,
+    NEXTPNR_ICE40,
+    UP5K,
+    netlist_of,
+    placed,
+    source_of,
+)
 from tables import made_files
 from twin import build
 from twin.build import ROOT
@@ -39,7 +48,7 @@ class Build:
 
     words: str
     netlist: Callable[[], Path]
-    family: str
+    nextpnr: Sequence[object]
     part: Sequence[str]
     clock_mhz: float
     options: tuple[object, ...]
@@ -64,7 +73,7 @@ def of_board(design: Design) -> Build:
     return Build(
         f"`{design.machine.name}` on the board `{design.board.name}`, with its pins",
         netlist,
-        design.board.part.family.name,
+        boards.placer(design).nextpnr,
         boards.chip(design),
         design.board.node_hz / 1e6,
         tuple(boards.pinned(design, folder)),
@@ -75,23 +84,25 @@ BUILDS: dict[str, Build] = {  # the shortest first
     "relay": Build(
         "relay, 16 orders, iCE40 UP5K",
         lambda: netlist_of(source_of("relay"), {"K": 16}, "ice40", 1),
-        *("ice40", UP5K, 24.0, FREE),
+        *(NEXTPNR_ICE40, UP5K, 24.0, FREE),
     ),
     "counter_box": Build(
         "node that counts, iCE40 UP5K",
         lambda: netlist_of(area.COUNTER_BOX, {}, "ice40", 1, area.SPRAM),
-        *("ice40", UP5K, 20.0, (*FREE, *area.FULL)),
+        *(NEXTPNR_ICE40, UP5K, 20.0, (*FREE, *area.FULL)),
     ),
-    "s0_node": Build("S0 node, LFE5U-25F-6", of_node(area.S0_NODE), "ecp5", ECP5, 60.0, ALONE),
+    "s0_node": Build(
+        "S0 node, LFE5U-25F-6", of_node(area.S0_NODE), NEXTPNR_ECP5, ECP5, 60.0, ALONE
+    ),
     "node8_step": Build(
         "node of 8 step axes, LFE5U-25F-6",
         of_node({**area.STEP_AXES, "AXES": 8}),
-        *("ecp5", ECP5, 60.0, ALONE),
+        *(NEXTPNR_ECP5, ECP5, 60.0, ALONE),
     ),
     "node4_sine": Build(
         "node of 4 sine axes, LFE5U-25F-6",
         of_node({**area.SINE_AXES, "AXES": 4}),
-        *("ecp5", ECP5, 60.0, ALONE),
+        *(NEXTPNR_ECP5, ECP5, 60.0, ALONE),
     ),
     **{design.name: of_board(design) for design in boards.placeable()},
 }
@@ -115,7 +126,7 @@ def placement(part: int, seed: int) -> Counts:
     with TemporaryDirectory(dir=BUILD) as folder:
         own = Path(shutil.copy(netlist, folder))
         first = seed - part  # of the campaign
-        mhz, _ = placed(own, one.family, one.part, one.clock_mhz, first + number, *one.options)
+        mhz, _ = placed(own, one.nextpnr, one.part, one.clock_mhz, first + number, *one.options)
     return {"placements": 1, "slow": int(mhz < one.clock_mhz), f"{name}_ns": 1000 / mhz}
 
 

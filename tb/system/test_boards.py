@@ -26,6 +26,7 @@ from figures.boards import boards_failed
 from figures.synthesis import SynthesisError
 from tb.bench import ROOT
 from tb.simulator import WAIVERS, package
+from tools import gowin
 from twin.build import rtl_path
 
 DESIGNS, TOO_LARGE = build.fitting()
@@ -726,7 +727,8 @@ def test_tools_for_gowin_that_are_missing_are_named(files, words, tmp_path):
 
 
 def test_a_part_whose_tools_are_missing_is_refused_before_anything_is_built(monkeypatch, tmp_path):
-    monkeypatch.setattr(build, "ROOT", tmp_path)
+    monkeypatch.setattr(gowin, "FOLDER", tmp_path)
+    monkeypatch.setattr(build, "OUT", tmp_path)
     said = []
     with pytest.raises(Misfit) as why:
         build.bitstream(fit(board.named("tang_nano_9k"), machine.named("relay")), 1, said.append)
