@@ -7,6 +7,7 @@ import math
 
 import pytest
 
+from boards import board as boards
 from tables import crossings
 from tb.common.test_synchroniser import test_synchroniser as synchroniser
 from tb.sense.test_axis_inputs import test_axis_inputs as axis_inputs
@@ -36,6 +37,19 @@ def test_an_input_that_changes_each_cycle_holds_a_year_with_twice_the_time_const
     for part, clock_hz in crossings.FAMILIES.values():
         slow = crossings.FlipFlop(2 * part.time_constant_s, part.window_s, part.path_s)
         assert crossings.mtbf_s(slow, 2, clock_hz, clock_hz) > YEAR_S
+
+
+def test_the_part_of_each_board_is_among_the_constants_or_said_to_have_none():
+    _, _, constants = crossings.PAGE.read_text(encoding="utf-8").partition("## Constants")
+    rows = [line.split("|")[1:-1] for line in constants.splitlines() if line.startswith("| ")]
+    parts = [
+        name.strip(" ").removesuffix(", as used") for row in rows for name in row[0].split(", ")
+    ]
+    for known in map(boards.named, boards.names()):
+        stem = {"LFE5U": "ECP5", "iCE40UP5K": "iCE40 UP5K"}
+        name = known.part.name.partition("-")[0]
+        assert stem.get(name, name) in parts
+    assert all("none published" in row[4] for row in rows if "unknown" in row[2])
 
 
 def wrong(name, logic, comment="pin"):
