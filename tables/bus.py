@@ -127,13 +127,18 @@ def targets_of(parameters: Entries) -> list[Target]:
     return sorted(targets, key=lambda t: (t.block.base, t.register.offset, t.field.low))
 
 
+def read(text: bytes | None = None) -> dict[str, Any]:
+    """The tables of bus.toml, or of this text, as they are written."""
+    return tomllib.loads((SOURCE.read_bytes() if text is None else text).decode())
+
+
 class Bus:
     """bus.toml, checked."""
 
     def __init__(self, text: bytes):
         # lines of a checkout may end in CR LF; the CRC is computed with LF
         text = text.replace(b"\r\n", b"\n")
-        table = tomllib.loads(text.decode())
+        table = read(text)
         self.crc = zlib.crc32(text)
         self.version: int = table["version"]
         self.longest_body: int = table["longest_body"]

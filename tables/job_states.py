@@ -5,18 +5,16 @@ sw/firmware/station/job/job.c, and check the rules that the table must keep.
 
 import re
 import sys
-import tomllib
 
-from tables import made_files
+from tables import bus, made_files
 from tables.made_files import ROOT
 
 SOURCE = ROOT / "sw" / "firmware" / "station" / "job" / "job.c"
-BUS = ROOT / "tables" / "bus.toml"
 PAGE = ROOT / "docs" / "job.md"
 BEGIN, END = "<!-- made by tables/job_states.py -->", "<!-- end of job_states -->"
 UNDER_WAY = "UNDER_WAY"  # in the table: from any state in which a job is under way
 FIRST = "LOADING"
-TABLE = tomllib.loads(BUS.read_text(encoding="utf-8"))
+TABLE = bus.read()
 ACTIONS = {name.upper() for name in TABLE["job_action"]}
 
 

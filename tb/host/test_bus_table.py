@@ -7,7 +7,6 @@ import re
 import shutil
 import struct
 import subprocess
-import tomllib
 import zlib
 from fractions import Fraction
 from pathlib import Path
@@ -19,7 +18,7 @@ from tables import bus as generator
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "tables" / "bus.toml"
-TABLE = tomllib.loads(SOURCE.read_text(encoding="utf-8"))
+TABLE = generator.read()
 HEADER = (ROOT / "sw" / "firmware" / "made" / "bus_protocol.h").read_text(encoding="utf-8")
 
 

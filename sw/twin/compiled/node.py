@@ -12,13 +12,13 @@ drive_interlock does it.
 """
 
 import re
-import tomllib
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
-from twin.build import FIRMWARE, ROOT
+from tables import bus
+from twin.build import FIRMWARE
 from twin.compiled.firmware import READ, WRITE, power_up
 
 DEFINES = {
@@ -29,7 +29,7 @@ DEFINES = {
         re.M,
     )
 }
-TABLE = tomllib.loads((ROOT / "tables" / "bus.toml").read_text())
+TABLE = bus.read()
 CAUSE: dict[int, str] = {code: name for name, (code, _) in TABLE["cause"].items()}
 STATE: dict[int, str] = {code: name for name, (code, _) in TABLE["state"].items()}
 FAULT = {name: 1 << bit for name, (bit, _) in TABLE["fault"].items()}
