@@ -5,6 +5,7 @@ python -m figures.soft_core             bytes of program, cycles of each section
                                         the Verilated core
 python -m figures.soft_core --area      LUT and MHz of each core on an ECP5
 python -m figures.soft_core --options   LUT of PicoRV32 with and without each of its options
+python -m figures.soft_core --sizes     writes the table of images in docs/soft_core.md
 
 VexRiscv is measured if its package pythondata-cpu-vexriscv is installed. docs/soft_core.md has the
 results.
@@ -26,11 +27,15 @@ from figures.common import Figure, Quick, console
 from figures.synthesis import BUILD, ECP5, NEXTPNR_ECP5, netlist_of, placed, source_of
 from firmware import build as tools
 from moire.made.registers import MAP_CRC
+from tables import made_files
 from twin import build
 from twin.build import ROOT
 
 HERE = Path(__file__).resolve().parent
 MEMORY_BYTES = 98304
+SMALLER_BYTES = 65536
+PAGE = ROOT / "docs" / "soft_core.md"
+BEGIN, END = "<!-- sizes -->", "<!-- /sizes -->"
 CLK_HZ = 60_000_000
 MOST_CYCLES = 20_000_000
 SECTIONS = ("start", "rounds", "requests", "plans", "pieces", "retarget", "waves")
@@ -38,6 +43,17 @@ SECTIONS = ("start", "rounds", "requests", "plans", "pieces", "retarget", "waves
 NODE = {0x000: MAP_CRC, 0x004: CLK_HZ, 0x008: 1, 0xCA8: 4}
 SEEDS = (1, 2, 3)
 LUT = {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}  # LUT4 that a cell takes
+
+
+IMAGES = {  # the image, its axes: its nodes
+    ("axis", 1): "S0: sine and cosine, calibration, segments, drives",
+    ("axis", 8): "the same",
+    ("stream", 1): "as `axis`, with [streams](stream.md)",
+    ("stream", 8): "the same",
+    ("steps", 8): "A/B/Z with drives, without sine and cosine",
+    ("counter", 4): "A/B/Z without drives: positions, index, scope",
+    ("station", 2): "S4: table, job, panel, EEPROM",
+}
 
 
 class Core(NamedTuple):
@@ -191,6 +207,33 @@ def options() -> None:
         print(f"PicoRV32 {words}: {lut_of(netlist, 'picorv32')} LUT", flush=True)
 
 
+def spaced(number: int) -> str:
+    """12 345"""
+    return f"{number:,}".replace(",", " ")
+
+
+def size_row(image: str, axes: int, report: str) -> str:
+    """The row of an image in docs/soft_core.md, from the report of its build."""
+    found = re.search(r"(\d+) bytes program \+ (\d+) data \+ (\d+) stack", report)
+    assert found
+    program, data, stack = map(int, found.groups())
+    used = program + data + stack
+    less = spaced(SMALLER_BYTES - used) if used <= SMALLER_BYTES else "–"
+    cells = (f"`{image}`", IMAGES[image, axes], str(axes), *map(spaced, (program, data, stack)))
+    free = 100 * (1 - used / MEMORY_BYTES)
+    return "| " + " | ".join((*cells, f"{free:.1f} %", less)) + " |"
+
+
+def sizes() -> None:
+    """Builds all images and writes their sizes into the page."""
+    heads = ("image", "node", "axes", "program", "data", "stack", "free of 96 KiB", "of 64 KiB")
+    rows = ["", "| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
+    for image, axes in IMAGES:
+        report = tools.build(MEMORY_BYTES, tools.OUT, False, image, axes)
+        rows.append(size_row(image, axes, report))
+    PAGE.write_text(made_files.filled(PAGE, BEGIN, END, [*rows, ""]), encoding="utf-8")
+
+
 def firmware_free_pct() -> float:
     """Of the memory of the S0 node: what program, data and stack leave."""
     report = tools.build(MEMORY_BYTES, tools.OUT, False, "axis", 1)
@@ -217,7 +260,11 @@ def main() -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--area", action="store_true", help="LUT and MHz instead of cycles")
     what.add_argument("--options", action="store_true", help="LUT of the options of PicoRV32")
+    what.add_argument("--sizes", action="store_true", help="write the table of images")
     chosen = parser.parse_args()
+    if chosen.sizes:
+        sizes()
+        return
     if chosen.options:
         options()
         return

@@ -9,10 +9,12 @@ import sys
 
 import pytest
 
+from figures import soft_core
 from firmware import build as firmware_build
 from twin.build import FIRMWARE
 
 MEMORY = 98304
+PAGE = soft_core.PAGE.read_text(encoding="utf-8")
 
 
 def build(out, *options, **environment):
@@ -57,6 +59,10 @@ def test_the_report_adds_up(made):
         and stack == 4096
     )
     assert program == (made[0] / "firmware.bin").stat().st_size
+
+
+def test_the_page_has_the_size_of_the_image(made):
+    assert soft_core.size_row("axis", 1, made[1]) in PAGE
 
 
 def test_a_firmware_that_does_not_fit_names_the_missing_bytes_and_the_largest_parts(made, tmp_path):
@@ -104,6 +110,7 @@ def test_steps_for_eight_axes_fit_64_kib_and_know_no_sine(tmp_path):
     run = build(tmp_path, "--image", "steps", "--memory", "65536")
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("steps: ") and " of 65536, " in run.stdout
+    assert soft_core.size_row("steps", 8, run.stdout) in PAGE
     names = functions(tmp_path / "steps.elf")
     assert {"planner_move", "homing_poll", "scope_operation"} <= names
     assert not {"calibration_open", "harmonics_table_entry", "ellipse_take"} & names
@@ -138,6 +145,7 @@ def test_a_failed_build_is_reported_in_one_line(tmp_path, options, environment, 
 def test_each_image_is_made_beside_the_others(made, tmp_path):
     run = build(tmp_path, "--image", "station")
     assert run.returncode == 0 and run.stdout.startswith("station: "), run.stderr
+    assert soft_core.size_row("station", 2, run.stdout) in PAGE
     station, axis = functions(tmp_path / "station.elf"), functions(made[0] / "firmware.elf")
     assert (
         "settings_operation" in station
