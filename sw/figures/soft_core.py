@@ -13,7 +13,6 @@ results.
 
 import argparse
 import itertools
-import json
 import re
 import shutil
 import struct
@@ -24,7 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from figures.common import Figure, Quick, console
-from figures.synthesis import BUILD, ECP5, NEXTPNR_ECP5, netlist_of, placed, source_of
+from figures.synthesis import BUILD, ECP5, NEXTPNR_ECP5, lut4s, netlist_of, placed, source_of
 from firmware import build as tools
 from moire.made.registers import MAP_CRC
 from tables import made_files
@@ -42,9 +41,6 @@ SECTIONS = ("start", "rounds", "requests", "plans", "pieces", "retarget", "waves
 # what the firmware reads of a node with one axis that has sine and cosine, {address: value}
 NODE = {0x000: MAP_CRC, 0x004: CLK_HZ, 0x008: 1, 0xCA8: 4}
 SEEDS = (1, 2, 3)
-LUT = {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}  # LUT4 that a cell takes
-
-
 IMAGES = {  # the image, its axes: its nodes
     ("axis", 1): "S0: sine and cosine, calibration, segments, drives",
     ("axis", 8): "the same",
@@ -177,11 +173,6 @@ def named_by_its_module(source: Path, module: str) -> Path:
     return copy
 
 
-def lut_of(netlist: Path, module: str) -> int:
-    cells = json.loads(netlist.read_text())["modules"][module]["cells"].values()
-    return sum(LUT.get(cell["type"], 0) for cell in cells)
-
-
 def area_of(core: Core) -> str:
     if core.package:
         source = named_by_its_module(folder_of(core.package) / core.file, "VexRiscv")
@@ -196,7 +187,7 @@ def area_of(core: Core) -> str:
         mhz, used = placed(netlist, NEXTPNR_ECP5, ECP5, 70, seed, *alone)
         clocks.append(f"{mhz:.1f}")
     rams = used.get("DP16KD", {"used": 0})["used"]
-    return f"{lut_of(netlist, source.stem)} LUT, {rams} block RAM, {', '.join(clocks)} MHz"
+    return f"{lut4s(netlist, source.stem)} LUT, {rams} block RAM, {', '.join(clocks)} MHz"
 
 
 def options() -> None:
@@ -204,7 +195,7 @@ def options() -> None:
     copy = named_by_its_module(source, "picorv32")
     for words, change in CHANGES.items():
         netlist = netlist_of(copy, {**PICORV32, **change}, "ecp5", 1)
-        print(f"PicoRV32 {words}: {lut_of(netlist, 'picorv32')} LUT", flush=True)
+        print(f"PicoRV32 {words}: {lut4s(netlist, 'picorv32')} LUT", flush=True)
 
 
 def spaced(number: int) -> str:
