@@ -70,7 +70,13 @@ def test_every_operation_answers_with_the_fields_that_its_description_promises(s
     body["set_parameters"] = {"velocity": "9 mm/s", "kp": 3}
     path = operation.path.format(node=1, axis=0, name="velocity")
     body["jog"] = {"by": "0.1um"}
+    shared.wait_until(lambda: shared.node.state() == "off")  # the client before has been seen off
     with shared.http() as client:
+        if operation.name == "give_up_scope":
+            client.done("POST", f"{AXIS}/scope", {"trigger": "fault"})
+        if operation.name == "scope_record":
+            client.done("POST", f"{AXIS}/scope", {"take": True})
+            shared.wait_until(lambda: shared.door.bridge.recordings[1].state == "full")
         if operation.name == "hold":
             client.done("POST", f"{AXIS}/jog", body["jog"])
         values = client.done(operation.method, path, body.get(operation.name))

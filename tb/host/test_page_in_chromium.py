@@ -13,6 +13,7 @@ from moire.made.bus_tables import FAULTS
 from tb.bench import ROOT
 from tb.fakes.frozen_network import FrozenNetwork
 from tb.fakes.served import Served, homed
+from tb.host.test_host_page_scope import turning
 
 AXIS = "/api/nodes/1/axes/0"
 PICTURE = ROOT / "build" / "report" / "page.png"  # docs/page.png is a copy
@@ -51,6 +52,7 @@ def served(shared):
         client.done("POST", f"{AXIS}/disable")
     shared.node.axes[0].causes = 0
     shared.node.port.requests.clear()
+    shared.node.port.on_request = lambda name, fields: None
     return shared
 
 
@@ -386,7 +388,7 @@ def test_the_plots_and_the_parameters_show_what_the_axis_does_at_every_width(ser
     page.locator(
         "canvas[aria-label^='Position in mm over the last 30 s: axis 1.0 from']"
     ).wait_for()
-    drawn = page.locator("canvas").evaluate_all(
+    drawn = page.locator("#charts canvas").evaluate_all(
         """all => all.map(one => new Set(new Uint32Array(one.getContext("2d").getImageData(
            0, 0, one.width, one.height).data.buffer)).size)"""
     )
@@ -416,6 +418,153 @@ def test_the_plots_and_the_parameters_show_what_the_axis_does_at_every_width(ser
     page.evaluate("window.scrollTo(0, 0)")
     PICTURE.parent.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=PICTURE)
+
+
+# the samples whose place in a chart has no pixel of its colour within one pixel
+NOT_DRAWN = """async ([name, xs, values]) => {
+    const { MARGIN } = await import("/page/plot.js");
+    const canvas = document.querySelector(`canvas[data-signal="${name}"]`);
+    const { from, to, low, high } = JSON.parse(canvas.dataset.range);
+    const context = canvas.getContext("2d");
+    const scale = canvas.width / canvas.clientWidth;
+    const right = canvas.clientWidth - MARGIN.right;
+    const bottom = canvas.clientHeight - MARGIN.bottom;
+    const colour = context.strokeStyle.match(/[0-9a-f]{2}/g).map((one) => parseInt(one, 16));
+    return xs.map((_, at) => at).filter((at) => {
+        const x = MARGIN.left + (xs[at] - from) / (to - from) * (right - MARGIN.left);
+        const y = bottom - (values[at] - low) / (high - low) * (bottom - MARGIN.top);
+        const { data } = context.getImageData(
+            Math.floor(x * scale) - 1, Math.floor(y * scale) - 1, 3, 3);
+        for (let n = 0; n < data.length; n += 4) {
+            const near = colour.every((one, part) => Math.abs(one - data[n + part]) < 24);
+            if (near && data[n + 3] > 60) return false;
+        }
+        return true;
+    });
+}"""
+
+
+def written(value, digits, unit):
+    """A number as the page writes it."""
+    text = f"{abs(value):.{digits}f}"
+    sign = "" if float(text) == 0 else "+" if value > 0 else "−"
+    return f"{sign}{text} {unit}"
+
+
+def scope_of(page):
+    """The controls of the scope, with a motion as its trigger."""
+    scope = page.locator("#scope")
+    scope.locator("[name=trigger]").select_option("motion")
+    scope.locator("[name=samples]").select_option("128")
+    return scope
+
+
+def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(served, page):
+    scope = scope_of(page)
+    scope.locator("[name=share]").select_option("10")
+    scope.get_by_role("button", name="Record").click()
+    see(page, "#scope .message", "waiting for the trigger")
+    move(page, "0.3", "Move by")
+    see(page, "#scope .message", "128 samples of axis 1.0, trigger: the axis moves or homes")
+    with served.http() as client:
+        record = client.done("GET", f"{AXIS}/scope/record")
+    time_ms = [1e3 * one for one in record["time_s"]]
+    drawn = {
+        "Position": ([value / 1e6 for value in record["position_nm"]], 6, "mm"),
+        "Error": ([value / 1e3 for value in record["error_nm"]], 4, "µm"),
+        "Drive command": ([100 * value for value in record["drive_command"]], 2, "%"),
+    }
+    assert max(drawn["Position"][0]) > min(drawn["Position"][0])
+    for name, (values, _, _) in drawn.items():
+        assert page.evaluate(NOT_DRAWN, [name, time_ms, values]) == []
+    assert page.evaluate(NOT_DRAWN, ["Position", time_ms, drawn["Position"][0][::-1]]) != []
+    for a, b in ((0, record["before"]), (64, 127)):
+        scope.get_by_label("Cursor A").fill(str(a))
+        scope.get_by_label("Cursor B").fill(str(b))
+        rows = scope.locator("tbody tr").evaluate_all(
+            "all => all.map(row => [...row.cells].map(cell => cell.textContent))"
+        )
+        expected = {"Time": (time_ms, 3, "ms"), **drawn}
+        assert rows == [
+            [name, *(written(v, *how) for v in (values[a], values[b], values[b] - values[a]))]
+            for name, (values, *how) in expected.items()
+        ]
+    scope.get_by_label("Cursor A").focus()
+    page.keyboard.press("ArrowRight")
+    see(page, "#scope tbody", written(time_ms[65], 3, "ms"))
+    chart = scope.locator("canvas").first
+    chart.click(position={"x": chart.bounding_box()["width"] - 9, "y": 20})
+    see(page, "#scope tbody", written(time_ms[127], 3, "ms"))
+    with page.expect_download() as download:
+        scope.get_by_role("button", name="Export CSV").click()
+    assert download.value.suggested_filename == "scope-1.0.csv"
+    assert download.value.path().read_text() == record["csv"]
+    scope.locator("[name=view]").select_option("spectrum")
+    see(page, "#scope .note", "peak amplitudes, Hann window")
+    amplitudes = [value / 1e3 for value in record["spectrum"]["error_nm"]]
+    assert page.evaluate(NOT_DRAWN, ["Error", record["frequency_hz"], amplitudes]) == []
+    see(page, "#scope figcaption", "Error, amplitude in µm over Hz")
+    scope.get_by_label("Drive command").focus()
+    page.keyboard.press("Enter")
+    assert scope.locator("canvas:visible").count() == 2
+    page.set_viewport_size({"width": 380, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 380
+    page.set_viewport_size({"width": 1280, "height": 1000})
+    scope.get_by_label("Drive command").check()
+
+
+def test_the_scope_has_one_owner_who_may_give_it_up_and_another_page_may_take_it(
+    served, page, context
+):
+    other = opened(context, served.door.url)
+    for one in (page, other):
+        scope_of(one).get_by_role("button", name="Record").click()
+        if one is page:
+            see(page, "#scope .message", "waiting for the trigger")
+    see(other, "#scope .message.wrong", "another client: the WebSocket client at")
+    other.get_by_role("button", name="Take the scope over").click()
+    see(other, "#scope .message", "waiting for the trigger")
+    see(page, "#scope .message.wrong", "has armed the scope")
+    other.get_by_role("button", name="Give up").click()
+    see(other, "#scope .message", "ended without a record: given up")
+    other.locator("#scope").get_by_label("One every").fill("1us")
+    other.get_by_role("button", name="Record").click()
+    see(other, "#scope .message.wrong", "samples come every 250us to 50ms")
+    other.close()
+
+
+def test_sine_and_cosine_are_drawn_with_their_ellipse_and_what_to_do(served, page):
+    signal = page.locator("#signal")
+    measure = signal.get_by_role("button", name="Measure")
+    measure.click()
+    see(page, "#signal .message", "No ellipse: 1 samples are too few")
+    turning(served.node)
+    see(page, "#signal .message", "100.0 ADC counts, which is good: the limits are 32 to 160")
+    signal.locator("canvas[aria-label*='samples and their ellipse']").wait_for()
+    assert "Quadrature error" in signal.locator("dl").inner_text()
+    page.set_viewport_size({"width": 380, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 380
+    page.set_viewport_size({"width": 1280, "height": 1000})
+    measure.click()
+    assert measure.get_attribute("aria-pressed") == "false"
+    turning(served.node, 20)
+    measure.click()
+    see(page, "#signal .message.wrong", "too weak: the smaller channel has")
+    see(page, "#signal .message.wrong", "What to do: clean scale and head")
+    measure.click()
+
+
+def test_the_statistics_of_the_bus_are_shown(served, page):
+    see(page, "#bus li", "the WebSocket client at 127.0.0.1")
+    with served.http() as client:
+        before = client.done("GET", "/api/bus")["repeats"]
+    spoilt = iter([[0x1FF]])
+    served.far.from_nodes = lambda word: next(spoilt, [word])
+    see(page, "#bus dl > :nth-child(2) dd", str(before + 1))
+    see(page, "#bus dd", "per s")
+    with served.http() as client:
+        found = client.done("GET", "/api/bus")
+    assert page.locator("#bus dd").nth(3).inner_text() == str(found["garbled"])
 
 
 def test_everything_that_can_be_pressed_has_a_name(page):

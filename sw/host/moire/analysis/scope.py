@@ -11,7 +11,7 @@ such a record.
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -154,17 +154,25 @@ class Scope:
             self.node.bus.until_next_poll(self.node)
         return self.read()
 
-    def read(self) -> Record:
-        """The record, as far as it is complete."""
+    def read(
+        self, samples: int = SAMPLES, progress: Callable[[int], object] = lambda done: None
+    ) -> Record:
+        """The record, as far as it is complete: its first samples, at most so many, but all up to
+        the trigger. `progress` gets the number of samples read so far.
+        """
         reply = self.node.request("scope")
+        count = min(reply["count"], max(samples, reply["before"] + 1))
         rows: list[list[int]] = []
-        while len(rows) < reply["count"]:
+        while len(rows) < count:
+            progress(len(rows))
             fields = self.node.request("read_scope", first=len(rows))
             rows += [
                 [fields[f"{name}_{n}"] for name in ("time", "position", "error", "command")]
                 for n in range(AT_ONCE)
             ]
-        times, positions, errors, commands = zip(*rows[: reply["count"]])
+        if not rows:
+            raise NoRecord(f"the scope of node {self.node.address} has no record: arm it first")
+        times, positions, errors, commands = zip(*rows[:count])
         unit_s = TIME_CYCLES / self.node.identity.clk_hz
         time_s = [units_passed * unit_s for units_passed in itertools.accumulate(times)]
         return Record(

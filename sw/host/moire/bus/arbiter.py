@@ -22,7 +22,7 @@ from moire.bus.protocol import IN_MOTION, MOST_AXES, NAMES, REQUESTS, parse_repl
 from moire.made.bus_tables import CAUSES, OPERATIONS, STATES
 from moire.made.registers import BLOCKS, FIELDS
 
-# what begins a motion, or drives the axis in another way
+# what begins a motion, or drives the axis in another way; arm_scope does so with an amplitude
 MOTIONS = frozenset(
     {
         *("home", "move", "prepare", "start", "start_at_sync", "begin_stream", "set_point"),
@@ -61,6 +61,7 @@ class Arbiter:
         self.moved_by: dict[Place, Hashable] = {}  # the client that began the last motion
         self.switched_on_by: dict[Place, Hashable] = {}
         self.claimed_until: dict[Place, float] = {}  # time of the bus
+        self.scope_of: dict[int, Hashable] = {}  # by node: the client that armed its scope last
         # the last request of a client to a node, with its reply
         self.last: dict[tuple[Hashable, int], tuple[bytes, bytes]] = {}
         self.farewells: list[Farewell] = []
@@ -75,7 +76,7 @@ class Arbiter:
         if body == known and operation != "follow":  # each reply to follow has a new position
             return reply
         places = list(places_of(address, operation, body))
-        if operation in MOTIONS and any(self.is_of_another(client, place) for place in places):
+        if is_motion(operation, body) and any(self.is_of_another(client, one) for one in places):
             answered: Reply = bytes([body[1], OTHER_CLIENT])
         else:
             answered = self.pairs.answer(client, address, operation, body)
@@ -109,7 +110,9 @@ class Arbiter:
 
     def note(self, client: Hashable, place: Place, operation: str, body: bytes) -> None:
         """The node has accepted this request for the axis."""
-        if operation in MOTIONS:
+        if operation == "arm_scope":
+            self.scope_of[place[0]] = client
+        if is_motion(operation, body):
             self.moved_by[place] = client
             self.claimed_until.pop(place, None)
         elif operation == "enable" and body[-1]:
@@ -131,6 +134,7 @@ class Arbiter:
         """A client has left: its axes have to be stopped and switched off."""
         self.last = {key: value for key, value in self.last.items() if key[0] != client}
         self.pairs.forget(client)
+        self.scope_of = {node: one for node, one in self.scope_of.items() if one != client}
         owned = {*self.moved_by.items(), *self.switched_on_by.items()}
         for place in sorted({place for place, owner in owned if owner == client}):
             self.farewells.append(Farewell(client, place, self.now()))
@@ -267,6 +271,13 @@ def places_of(address: int, operation: str, body: bytes) -> Iterator[Place]:
         yield address, fields["axis"]
     elif "axes" in fields:
         yield from ((address, axis) for axis in range(MOST_AXES) if fields["axes"] >> axis & 1)
+
+
+def is_motion(operation: str, body: bytes) -> bool:
+    """Whether a request begins a motion: a scope without an amplitude only looks."""
+    if operation == "arm_scope":
+        return fields_of(operation, body)["amplitude"] != 0
+    return operation in MOTIONS
 
 
 def accepted(body: bytes) -> bool:

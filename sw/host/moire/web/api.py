@@ -6,13 +6,14 @@ server and the OpenAPI document are made from it.
 import asyncio
 import re
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from fractions import Fraction
 from http import HTTPStatus
 from importlib.metadata import version
 from typing import Any, TypeVar
 
 from moire import units
+from moire.analysis.scope import SAMPLES, TRIGGERS
 from moire.bus.arbiter import Place
 from moire.bus.protocol import ADDRESSES
 from moire.client import remedies
@@ -24,6 +25,7 @@ from moire.client.records import Identity, Status
 from moire.client.values import ParameterValue
 from moire.errors import MoireError, NoAnswer, Refused
 from moire.made.bus_tables import FAULTS, PARAMETERS
+from moire.web import lissajous, recording
 from moire.web.bridge import Bridge, Client, Moment
 from moire.web.groups import group_of
 from moire.web.jog import HOLD_S
@@ -32,6 +34,7 @@ from moire.web.refusals import BadRequest
 Result = TypeVar("Result")
 Values = dict[str, Any]
 AXIS = "/api/nodes/{node}/axes/{axis}"
+WHOLE, LARGEST = re.compile(r"-?[0-9]{1,9}"), 10**9
 FRESH_S = 0.01  # of the bus: how old the reply to a poll may be, unless a client says otherwise
 
 
@@ -64,8 +67,8 @@ class Call:
 
 @dataclass(frozen=True)
 class Given:
-    """A field of a request. `kind` is "text", "flag", "value" (a text, or a plain number), or
-    "length" or "time", which are texts with a unit.
+    """A field of a request. `kind` is "text", "flag", "whole number", "value" (a text, or a plain
+    number), or "length" or "time", which are texts with a unit.
     """
 
     name: str
@@ -125,6 +128,12 @@ def read(one: Given, value: Any) -> Any:
         if isinstance(value, bool):
             return value
         raise wrong_type(one, "true or false")
+    if one.kind == "whole number":
+        if isinstance(value, str) and WHOLE.fullmatch(value):
+            value = int(value)
+        if isinstance(value, int) and not isinstance(value, bool) and abs(value) < LARGEST:
+            return value
+        raise wrong_type(one, "a whole number")
     if one.kind == "value" and isinstance(value, int | float) and not isinstance(value, bool):
         return repr(value)  # a plain number, which only a parameter without a unit takes
     if not isinstance(value, str):
@@ -160,6 +169,17 @@ async def server(call: Call) -> Values:
         "packet_clients": len(gateway.clients),
         "moved_by": {f"{node}.{axis}": owner for (node, axis), owner in moved.items()},
         "may_change": call.may_change,
+    }
+
+
+async def bus(call: Call) -> Values:
+    gateway = call.bridge.gateway
+    return {
+        "time_s": gateway.time,
+        **asdict(gateway.exchanges.statistics),
+        "no_request": gateway.refused,
+        "waiting": len(gateway.waiting),
+        "clients": sorted(map(str, [*call.bridge.present, *gateway.clients])),
     }
 
 
@@ -390,6 +410,32 @@ async def home(call: Call) -> Values:
     return await motion(call, begin, Axis.enable)
 
 
+# ------------------------------------------------------------------ scope and signal
+
+
+async def arm_scope(call: Call) -> Values:
+    await recording.arm(call.bridge, call.client, call.place, call.given)
+    return recording.progress_values(call.bridge, call.place)
+
+
+async def scope(call: Call) -> Values:
+    return recording.progress_values(call.bridge, call.place)
+
+
+async def give_up_scope(call: Call) -> Values:
+    recording.give_up(call.bridge, call.client, call.place)
+    return recording.progress_values(call.bridge, call.place)
+
+
+async def scope_record(call: Call) -> Values:
+    return recording.record_values(call.bridge, call.place)
+
+
+async def signal(call: Call) -> Values:
+    count, fresh = call.given.get("samples", lissajous.AT_FIRST), call.given.get("fresh", False)
+    return await lissajous.measured(call.bridge, call.client, call.place, count, fresh)
+
+
 # ------------------------------------------------------------------ parameters
 
 
@@ -470,6 +516,20 @@ PARAMETER = {
     "allowed": ("text", "the limits with their unit, or the names of the choices"),
     "default_written": ("text", "the default, written as `written` is"),
 }
+NUMBER = ("whole number", "number of the record; no other one of this server has it")
+SCOPE = {
+    "number": NUMBER,
+    "state": (
+        "text",
+        "empty, waiting (for the trigger), recording, reading, full, or ended without a record",
+    ),
+    "words": ("text", "the state in words, and why a record has ended"),
+    "axis": ("text or null", "the axis whose record it is, as node.axis"),
+    "trigger": ("text or null", "its trigger"),
+    "owner": ("text or null", "the client to which the scope of the node belongs until then"),
+    "done": ("whole number", "samples that the server has read"),
+    "samples": ("whole number", "samples that it will read"),
+}
 AGE = Given(
     "max_age",
     "time",
@@ -495,6 +555,23 @@ OPERATIONS = (
             "packet_clients": ("whole number", "clients of TCP, RFC 2217 and the pseudo terminal"),
             "moved_by": ("map of texts", "by node.axis: the client that moved it last"),
             "may_change": ("flag", "false if the token of the request only reads"),
+        },
+    ),
+    Operation(
+        "GET",
+        "/api/bus",
+        "What this server has met on the bus since its start, and who asks it.",
+        bus,
+        {
+            "time_s": ("number", "time of the bus"),
+            "exchanges": ("whole number", "requests to nodes"),
+            "repeats": ("whole number", "requests that were sent once more"),
+            "no_answer": ("whole number", "attempts without an answer, also of absent nodes"),
+            "garbled": ("whole number", "answers that were damaged"),
+            "old_reply": ("whole number", "answers to the request before"),
+            "no_request": ("whole number", "packets of clients that were no request"),
+            "waiting": ("whole number", "requests that wait for the bus now"),
+            "clients": ("list of texts", "all clients that are connected"),
         },
     ),
     Operation("GET", "/api/nodes", "The nodes that answer.", nodes, {"nodes": ("list", "nodes")}),
@@ -593,6 +670,76 @@ OPERATIONS = (
         STATUS,
     ),
     Operation("POST", f"{AXIS}/clear", "Clear the faults whose cause is gone.", clear, STATUS),
+    Operation(
+        "POST",
+        f"{AXIS}/scope",
+        f"Record up to {SAMPLES} samples of position, error and drive command, some of them from "
+        "before a trigger. The scope of the node then belongs to the client until the record is "
+        "complete. GET says how far it is.",
+        arm_scope,
+        SCOPE,
+        given=(
+            Given("trigger", "text", f"{', '.join(TRIGGERS)}; now if not given", "motion"),
+            Given("before", "whole number", "samples before the trigger; 0 if not given", 20),
+            Given("samples", "whole number", f"samples to read; {SAMPLES} if not given", SAMPLES),
+            Given("every", "time", "time from sample to sample; 1ms if not given", "1ms"),
+            Given("level", "length", "error that triggers, with the trigger error", "1 um"),
+            Given("take", "flag", "whether to take the scope over from another client", True),
+        ),
+    ),
+    Operation("GET", f"{AXIS}/scope", "How far the record of the node is.", scope, SCOPE),
+    Operation(
+        "DELETE",
+        f"{AXIS}/scope",
+        "Wait no more for the record of this client. The scope is free then.",
+        give_up_scope,
+        SCOPE,
+    ),
+    Operation(
+        "GET",
+        f"{AXIS}/scope/record",
+        "The last complete record of an axis, its amplitude spectra, and the file that 'moire "
+        "scope read' writes.",
+        scope_record,
+        {
+            "number": NUMBER,
+            "trigger": ("text", "its trigger"),
+            "before": ("whole number", "samples before the trigger"),
+            "time_s": ("list of numbers", "times of the samples; 0 is the trigger"),
+            "position_nm": ("list of numbers", "positions"),
+            "error_nm": ("list of numbers", "target minus position"),
+            "drive_command": ("list of numbers", "commands, of full scale"),
+            "window": ("text", "window of the spectra"),
+            "frequency_hz": ("list of numbers", "frequencies of the spectra"),
+            "spectrum": ("map of lists", "amplitudes (peak) by the names of the signals above"),
+            "csv": ("text", "the record as CSV"),
+        },
+    ),
+    Operation(
+        "GET",
+        f"{AXIS}/signal",
+        "Sine and cosine of an axis: takes samples, adds them to those that this client has taken "
+        f"before (at most {lissajous.KEPT} are kept), and fits an ellipse to all. The axis has to "
+        "move by some signal periods meanwhile; equal samples in a row count once.",
+        signal,
+        {
+            "cos": ("list of numbers", "samples of the cosine, ADC counts"),
+            "sin": ("list of numbers", "samples of the sine, ADC counts"),
+            "ellipse": (
+                "map of numbers or null",
+                "offsets, amplitudes and deviation (rms) in ADC counts, quadrature_error_deg; null "
+                "where the samples determine none",
+            ),
+            "curve": ("map of lists", "points of the ellipse: cos, sin"),
+            "verdict": ("text", "good, weak, large, saturated or unknown"),
+            "words": ("text", "the amplitude in words"),
+            "to_do": ("text", "what to do about it; empty if nothing is to be done"),
+        },
+        given=(
+            Given("samples", "whole number", f"how many to take, 1 to {lissajous.MOST}", 32),
+            Given("fresh", "flag", "whether to forget the earlier samples first", True),
+        ),
+    ),
     Operation(
         "GET",
         f"{AXIS}/parameters",

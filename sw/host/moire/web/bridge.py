@@ -11,11 +11,12 @@ import itertools
 import math
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from concurrent.futures import Future, InvalidStateError, ThreadPoolExecutor
 from fractions import Fraction
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from moire.bus.arbiter import Place, request
 from moire.bus.gateway import Gateway, Waiting
@@ -30,6 +31,9 @@ from moire.client.records import Identity, Status
 from moire.errors import BusError, MoireError, NoAnswer, OutOfRange, PortError, Refused
 from moire.made.bus_tables import PARAMETERS
 from moire.web.jog import Jog
+
+if TYPE_CHECKING:
+    from moire.web.recording import Recording
 
 LEASE_S = 5.0  # of the clock: a client that has asked nothing for so long has left
 TIDY_S = 0.05  # of the clock, between two looks at clients and watchdogs
@@ -52,6 +56,8 @@ class Client:
     def __init__(self, name: str, given: str | None = None):
         self.name, self.given, self.heard = name, given, time.monotonic()
         self.busy = 0  # requests in progress
+        # its last samples of (cosine, sine) by axis, see moire.web.lissajous
+        self.samples: dict[Place, deque[tuple[int, int]]] = {}
         self.left = False
 
     def __str__(self) -> str:
@@ -79,6 +85,7 @@ class Bridge:
         self.absent: dict[int, float] = {}  # by address: until when, of the clock
         self.seen: set[int] = set()  # addresses that have ever answered
         self.jogs: dict[tuple[Client, Place], Jog] = {}
+        self.recordings: dict[int, Recording] = {}  # by address, the last one of each scope
         self.pools = {
             name: ThreadPoolExecutor(count, f"moire-{name}") for name, count in THREADS.items()
         }

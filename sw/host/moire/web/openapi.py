@@ -23,6 +23,15 @@ SCHEMAS: Mapping[str, dict[str, Any]] = {  # of the types that the table names
     "number or null": {"type": ["number", "null"]},
     "list of texts": {"type": "array", "items": {"type": "string"}},
     "list": {"type": "array", "items": {"type": "object"}},
+    "list of numbers": {"type": "array", "items": {"type": "number"}},
+    "map of lists": {
+        "type": "object",
+        "additionalProperties": {"type": "array", "items": {"type": "number"}},
+    },
+    "map of numbers or null": {
+        "type": ["object", "null"],
+        "additionalProperties": {"type": "number"},
+    },
     "map of texts": {"type": "object", "additionalProperties": {"type": "string"}},
 }
 ERROR = {

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page as a whole: the connection, the axes, the stop of all of them, and the plots.
+// The page as a whole: the connection, the axes, the stop of all of them, the plots, the panels.
 
 import { AxisView } from "./axis.js";
+import { BusPanel } from "./bus.js";
 import { releaseAll } from "./hold.js";
 import { Link } from "./link.js";
 import { ParameterTable } from "./parameters.js";
 import { History, Plot, QUANTITIES } from "./plot.js";
+import { ScopePanel } from "./scope.js";
+import { SignalPanel } from "./signal.js";
 
 const DRAW_MS = 80; // between two pictures of the plots
 const DESCRIBE_MS = 2000; // between two descriptions of them in words
@@ -33,10 +36,14 @@ const link = new Link({
       view.readLimits().catch((error) => view.fail(error, null));
     }
     parameters.open([...views.keys()], mayChange);
+    scope.open([...views.keys()], mayChange);
+    signal.open([...views.keys()]);
+    bus.read().catch(() => {});
     showServer(server);
   },
   lost(reason) {
     releaseAll();
+    scope.lost();
     at("stop").hidden = true;
     document.body.classList.add("stale");
     setLink("lost", "not connected");
@@ -64,6 +71,7 @@ const link = new Link({
   },
   beat(server) {
     showServer(server);
+    bus.read().catch(() => {}); // a lost server is shown by what asks on
     if (++beats % 2 === 0) {
       for (const view of views.values()) view.readSpeed().catch(() => {});
     }
@@ -71,6 +79,9 @@ const link = new Link({
   },
 });
 const parameters = new ParameterTable(at("parameters"), link);
+const scope = new ScopePanel(at("scope"), link);
+const signal = new SignalPanel(at("signal"), link);
+const bus = new BusPanel(at("bus"), link);
 
 function setLink(state, text) {
   at("link").dataset.state = state;
@@ -122,6 +133,12 @@ for (const name of ["keydown", "keyup", "keypress"]) {
     true,
   );
 }
+
+document.addEventListener("keydown", (event) => {
+  if (event.key !== "Enter" || event.target.type !== "checkbox") return;
+  event.preventDefault(); // the space bar, which would do this, stops the axes
+  event.target.click();
+});
 
 at("access").addEventListener("submit", (event) => {
   event.preventDefault();

@@ -3,8 +3,8 @@
 
 const LONGEST_S = 125; // of the machine's time, that is kept
 const GAP_S = 0.5; // without samples: the line is interrupted
-const MARGIN = { left: 64, right: 8, top: 8, bottom: 22 };
-const DASHES = [[], [6, 3], [2, 2], [8, 3, 2, 3]];
+export const MARGIN = { left: 64, right: 8, top: 8, bottom: 22 };
+export const DASHES = [[], [6, 3], [2, 2], [8, 3, 2, 3]];
 
 export const QUANTITIES = [
   { name: "Error", unit: "µm", of: (row) => (row.target_nm - row.position_nm) / 1e3 },
@@ -55,7 +55,14 @@ export function ticks(low, high, count) {
   return found;
 }
 
-/** The range of the values with a margin; never empty. */
+/** A range with a margin around it; never empty. */
+export function widened(low, high) {
+  if (low > high) return [-1, 1];
+  const margin = 0.06 * (high - low) || Math.max(Math.abs(high) * 1e-6, 1e-3);
+  return [low - margin, high + margin];
+}
+
+/** The range of the values with a margin. */
 function rangeOf(lists, index) {
   let low = Infinity;
   let high = -Infinity;
@@ -65,9 +72,53 @@ function rangeOf(lists, index) {
       if (row[index] > high) high = row[index];
     }
   }
-  if (low > high) return [-1, 1];
-  const margin = 0.06 * (high - low) || Math.max(Math.abs(high) * 1e-6, 1e-3);
-  return [low - margin, high + margin];
+  return widened(low, high);
+}
+
+/** Clears a canvas and draws the axes of a diagram; `marks` are [value, text] below it. Returns the
+ *  context, its style, and the functions from values to pixels; null while it is not shown. */
+export function frame(canvas, { from, to, low, high, marks }) {
+  const scale = window.devicePixelRatio || 1;
+  const width = canvas.clientWidth;
+  const height = canvas.clientHeight;
+  if (!width || !height) return null;
+  if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) {
+    canvas.width = Math.round(width * scale);
+    canvas.height = Math.round(height * scale);
+  }
+  const style = getComputedStyle(canvas);
+  const context = canvas.getContext("2d");
+  context.setTransform(scale, 0, 0, scale, 0, 0);
+  context.clearRect(0, 0, width, height);
+  const right = width - MARGIN.right;
+  const bottom = height - MARGIN.bottom;
+  const x = (value) => right - ((to - value) / (to - from)) * (right - MARGIN.left);
+  const y = (value) => bottom - ((value - low) / (high - low)) * (bottom - MARGIN.top);
+  context.font = style.font;
+  context.lineWidth = 1;
+  context.strokeStyle = style.getPropertyValue("--grid");
+  context.fillStyle = style.color;
+  context.beginPath();
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  for (const text of ticks(low, high, 4)) {
+    const at = Math.round(y(Number(text))) + 0.5;
+    context.moveTo(MARGIN.left, at);
+    context.lineTo(right, at);
+    context.fillText(text.replace("-", "−"), MARGIN.left - 6, at);
+  }
+  context.textBaseline = "bottom";
+  for (const [value, text] of marks) {
+    const at = Math.round(x(value)) + 0.5;
+    context.moveTo(at, MARGIN.top);
+    context.lineTo(at, bottom);
+    const half = context.measureText(text).width / 2;
+    context.textAlign = at + half > width ? "right" : "center";
+    context.fillText(text, at, height);
+  }
+  context.stroke();
+  context.lineWidth = 1.5;
+  return { context, style, x, y, top: MARGIN.top, bottom };
 }
 
 export class Plot {
@@ -85,48 +136,15 @@ export class Plot {
 
   /** Draws the last `span` seconds of the histories, by name. */
   draw(histories, end, span) {
-    const { canvas } = this;
-    const scale = window.devicePixelRatio || 1;
-    const width = canvas.clientWidth;
-    const height = canvas.clientHeight;
-    if (!width || !height) return;
-    if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) {
-      canvas.width = Math.round(width * scale);
-      canvas.height = Math.round(height * scale);
-    }
-    const style = getComputedStyle(canvas);
-    const context = canvas.getContext("2d");
-    context.setTransform(scale, 0, 0, scale, 0, 0);
-    context.clearRect(0, 0, width, height);
     const lists = [...histories.values()].map((history) => history.since(end - span));
     const [low, high] = rangeOf(lists, this.index);
-    const right = width - MARGIN.right;
-    const bottom = height - MARGIN.bottom;
-    const x = (time) => right - ((end - time) / span) * (right - MARGIN.left);
-    const y = (value) => bottom - ((value - low) / (high - low)) * (bottom - MARGIN.top);
-    context.font = style.font;
-    context.lineWidth = 1;
-    context.strokeStyle = style.getPropertyValue("--grid");
-    context.fillStyle = style.color;
-    context.beginPath();
-    context.textAlign = "right";
-    context.textBaseline = "middle";
-    for (const text of ticks(low, high, 4)) {
-      const at = Math.round(y(Number(text))) + 0.5;
-      context.moveTo(MARGIN.left, at);
-      context.lineTo(right, at);
-      context.fillText(text.replace("-", "−"), MARGIN.left - 6, at);
-    }
-    context.textBaseline = "bottom";
-    for (const text of ticks(-span, 0, 4)) {
-      const at = Math.round(x(end + Number(text))) + 0.5;
-      context.moveTo(at, MARGIN.top);
-      context.lineTo(at, bottom);
-      context.textAlign = Number(text) === 0 ? "right" : "center";
-      context.fillText(Number(text) === 0 ? "now" : `${text.replace("-", "−")} s`, at, height);
-    }
-    context.stroke();
-    context.lineWidth = 1.5;
+    const marks = ticks(-span, 0, 4).map((text) => [
+      end + Number(text),
+      Number(text) === 0 ? "now" : `${text.replace("-", "−")} s`,
+    ]);
+    const drawn = frame(this.canvas, { from: end - span, to: end, low, high, marks });
+    if (drawn === null) return;
+    const { context, style, x, y } = drawn;
     lists.forEach((rows, number) => {
       context.strokeStyle = style.getPropertyValue(`--series-${(number % 4) + 1}`);
       context.setLineDash(DASHES[number % DASHES.length]);

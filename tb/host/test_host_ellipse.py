@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""moire.analysis.ellipse: known ellipses are found, and amplitudes judged at their limits."""
+
+import math
+import random
+
+import pytest
+
+from moire.analysis.ellipse import OFF, Ellipse, Limits, NoEllipse, fit, judged, widest_gap_deg
+
+KNOWN = Ellipse(5.0, -7.5, 101.0, 88.0, 6.0, 0.0)
+LIMITS = Limits(32, 160, 126)
+
+
+def samples(ellipse, turns):
+    error = math.radians(ellipse.quadrature_error_deg)
+    return (
+        [ellipse.cos_offset + ellipse.cos_amplitude * math.cos(turn) for turn in turns],
+        [ellipse.sin_offset + ellipse.sin_amplitude * math.sin(turn + error) for turn in turns],
+    )
+
+
+def evenly(count, share=1.0):
+    return [math.tau * share * n / count for n in range(count)]
+
+
+@pytest.mark.parametrize("share", [1.0, 0.8])
+@pytest.mark.parametrize("quadrature_error_deg", [-20, 0, 6])
+def test_offsets_amplitudes_and_quadrature_error_are_found(share, quadrature_error_deg):
+    known = Ellipse(5.0, -7.5, 101.0, 88.0, quadrature_error_deg, 0.0)
+    found = fit(*samples(known, evenly(40, share)))
+    assert vars(found) == pytest.approx(vars(known), abs=1e-6)
+    assert found.amplitude == pytest.approx(94.5)
+
+
+def test_noise_of_the_adc_is_the_deviation():
+    noise = random.Random(4)
+    cos, sin = samples(KNOWN, evenly(512))
+    found = fit(*([value + noise.gauss(0, 1) for value in one] for one in (cos, sin)))
+    assert found.deviation == pytest.approx(1, rel=0.15)
+    for name in ("cos_offset", "sin_offset", "cos_amplitude", "sin_amplitude"):
+        assert getattr(found, name) == pytest.approx(getattr(KNOWN, name), abs=0.4)
+
+
+def test_the_curve_lies_on_the_ellipse_and_is_closed():
+    cos, sin = KNOWN.points(25)
+    assert len(cos) == len(sin) == 25
+    assert (cos[0], sin[0]) == pytest.approx((cos[-1], sin[-1]))
+    assert vars(fit(cos, sin)) == pytest.approx(vars(KNOWN), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "turns, words",
+    [
+        (evenly(11), "11 samples are too few for an ellipse: 12 at least"),
+        (evenly(60, 0.5), "degrees of the circle empty: move the axis by some signal periods"),
+        ([0.3] * 20, "degrees of the circle empty"),
+    ],
+)
+def test_samples_that_determine_no_ellipse_are_refused_with_the_reason(turns, words):
+    with pytest.raises(NoEllipse, match=words):
+        fit(*samples(KNOWN, turns))
+
+
+def test_samples_on_a_hyperbola_or_on_few_points_are_no_ellipse():
+    steps = [n / 10 for n in range(-20, 21)]
+    right, high = [math.cosh(n) for n in steps], [2 * math.sinh(n) for n in steps]
+    both = [*right, *(-one for one in right)], high + high
+    with pytest.raises(NoEllipse, match="on no ellipse"):
+        fit(*both)
+    with pytest.raises(NoEllipse, match="on no ellipse"):
+        fit([100, 0, -100, 0] * 4, [0, 100, 0, -100] * 4)
+
+
+def test_a_gap_reaches_across_the_angle_of_180_degrees():
+    turns = [math.radians(one) for one in (100, 160, -160, -60, 20)]
+    xs, ys = [math.cos(one) for one in turns], [math.sin(one) for one in turns]
+    assert widest_gap_deg(xs, ys) == pytest.approx(100)
+
+
+@pytest.mark.parametrize(
+    "amplitude, largest, limits, kind",
+    [
+        (32, 100, LIMITS, "good"),
+        (31.9, 100, LIMITS, "weak"),
+        (160, 126, LIMITS, "good"),
+        (160.1, 126, LIMITS, "large"),
+        (100, 126, LIMITS, "good"),
+        (100, 127, LIMITS, "saturated"),
+        (100, 127, Limits(32, 160, OFF), "good"),
+        (100, 127, None, "unknown"),
+    ],
+)
+def test_an_amplitude_is_judged_at_its_limits(amplitude, largest, limits, kind):
+    found = judged(Ellipse(0, 0, amplitude, amplitude, 0, 0), largest, limits)
+    assert found.kind == kind and f"{amplitude:.1f} ADC counts" in found.words
+    assert bool(found.to_do) == (kind in ("weak", "large", "saturated"))
+
+
+def test_the_smaller_channel_may_be_weak_and_the_larger_one_too_large():
+    assert judged(Ellipse(0, 0, 100, 20, 0, 0), 100, LIMITS).kind == "weak"
+    assert judged(Ellipse(0, 0, 170, 100, 0, 0), 126, LIMITS).kind == "large"
