@@ -52,7 +52,7 @@ def test_the_curve_lies_on_the_ellipse_and_is_closed():
 @pytest.mark.parametrize(
     "turns, words",
     [
-        (evenly(11), "11 samples are too few for an ellipse: 12 at least"),
+        (evenly(11), "too few different samples: 11 of at least 12"),
         (evenly(60, 0.5), "degrees of the circle empty: move the axis by some signal periods"),
         ([0.3] * 20, "degrees of the circle empty"),
     ],

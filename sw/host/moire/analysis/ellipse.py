@@ -74,7 +74,9 @@ class Judged:
 def fit(cos: Sequence[float], sin: Sequence[float]) -> Ellipse:
     """The ellipse with the least squares of the conic equation; raises NoEllipse."""
     if len(cos) < FEWEST:
-        raise NoEllipse(f"{len(cos)} samples are too few for an ellipse: {FEWEST} at least")
+        raise NoEllipse(
+            f"too few different samples: {len(cos)} of at least {FEWEST}; does the axis move?"
+        )
     both = numpy.array([cos, sin], dtype=float)
     middle = (both.max(axis=1) + both.min(axis=1)) / 2
     reach = float(abs(both - middle[:, None]).max()) or 1.0

@@ -62,14 +62,18 @@ export class Chart {
       context.moveTo(x(xs[at]), top);
       context.lineTo(x(xs[at]), bottom);
       context.stroke();
-      context.textAlign = "left";
+      const isRight = 2 * at > xs.length; // the letter is inside, and not on that of the other one
+      context.textAlign = isRight ? "right" : "left";
       context.textBaseline = "top";
-      context.fillText("AB"[number], x(xs[at]) + 3, top);
+      context.fillText("AB"[number], x(xs[at]) + (isRight ? -3 : 3), top + 12 * number);
     });
     context.setLineDash([]);
     context.strokeStyle = style.getPropertyValue(`--series-${this.signal.series}`);
+    context.lineCap = context.lineJoin = "round"; // the ends are whole, and peaks have no spikes
     context.beginPath();
     xs.forEach((value, at) => context.lineTo(x(value), y(values[at])));
     context.stroke();
+    context.lineCap = "butt";
+    context.lineJoin = "miter";
   }
 }

@@ -232,7 +232,7 @@ export class ScopePanel {
     if (this.view.value === "spectrum") {
       const errors = this.record.spectrum.error_nm;
       const largest = errors.indexOf(Math.max(...errors));
-      this.cursors = [0, largest];
+      this.cursors = [largest, xs.length - 1];
       this.note.textContent =
         `Amplitude spectrum: peak amplitudes, ${this.record.window} window, lines ` +
         `${(xs[1] - xs[0]).toFixed(2)} Hz apart, without the mean. Largest line of the error: ` +
