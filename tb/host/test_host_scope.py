@@ -91,10 +91,21 @@ def test_positions_are_complete_where_the_low_word_wraps():
     assert {b - a for a, b in zip(positions, positions[1:])} == {8 * 800}
 
 
+def test_fewer_samples_are_read_as_far_as_asked_for_with_progress():
+    scope, done = Scope(axis_of(BusNode(axes=[Ramp()]))), []
+    scope.arm("error", before=40, level="500nm")
+    record = scope.wait()
+    assert scope.read(52, done.append).time_s == record.time_s[:52]
+    assert done == list(range(0, 52, 5))
+    assert len(scope.read(16).time_s) == record.before + 1 > 16  # the trigger is among them
+
+
 def test_a_missing_trigger_and_a_scope_that_is_not_armed_are_one_sentence():
     scope = Scope(axis_of(BusNode()))
     with pytest.raises(NoRecord, match="the scope of node 1 has no record: arm it first"):
         scope.wait()
+    with pytest.raises(NoRecord, match="arm it first"):
+        scope.read()
     scope.arm("motion")
     assert scope.state() == "waiting"
     with pytest.raises(NoRecord, match="no record after 1s: waiting for the trigger"):

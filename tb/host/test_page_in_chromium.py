@@ -17,6 +17,7 @@ from tb.host.test_host_page_scope import turning
 
 AXIS = "/api/nodes/1/axes/0"
 PICTURE = ROOT / "build" / "report" / "page.png"  # docs/page.png is a copy
+SCOPE_PICTURE = PICTURE.with_name("page_scope.png")  # the same
 PATIENCE_MS = 30_000
 WIDTHS = (380, 1280, 2560)
 ESTOP = next(code for code, (name, _) in FAULTS.items() if name == "estop")
@@ -489,6 +490,9 @@ def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(se
             [name, *(written(v, *how) for v in (values[a], values[b], values[b] - values[a]))]
             for name, (values, *how) in expected.items()
         ]
+    page.evaluate("document.querySelector('header').style.position = 'static'")
+    scope.screenshot(path=SCOPE_PICTURE)
+    page.evaluate("document.querySelector('header').style.position = ''")
     scope.get_by_label("Cursor A").focus()
     page.keyboard.press("ArrowRight")
     see(page, "#scope tbody", written(time_ms[65], 3, "ms"))

@@ -43,7 +43,6 @@ const link = new Link({
   },
   lost(reason) {
     releaseAll();
-    scope.lost();
     at("stop").hidden = true;
     document.body.classList.add("stale");
     setLink("lost", "not connected");

@@ -112,11 +112,6 @@ export class ScopePanel {
     }
   }
 
-  /** The connection is lost, and with it what this page waits for. */
-  lost() {
-    if (!this.progress.hidden) this.wait(false);
-  }
-
   say(text, isWrong = false) {
     if (this.message.textContent !== text) this.message.textContent = text;
     this.message.classList.toggle("wrong", isWrong);
