@@ -51,6 +51,7 @@ module node #(
     parameter FIRMWARE = "",  // file of its contents at power-up
     parameter int PROGRAM_BYTES = 32768,  // bytes that a serial core copies, a power of two
     parameter int FLASH_START = 131072,  // byte address of its firmware in the flash
+    parameter int HAS_UPDATE = 0,  // 1: a serial core can write new firmware into the flash
     parameter REGISTER_STYLE = "auto",  // ram_style of the memory of the settings
     parameter QUEUE_STYLE = "distributed"  // ram_style of the queues of the bus
 ) (
@@ -174,7 +175,8 @@ module node #(
         serial_core #(
             .MEMORY_BYTES (MEMORY_BYTES),
             .PROGRAM_BYTES(PROGRAM_BYTES),
-            .FLASH_START  (FLASH_START)
+            .FLASH_START  (FLASH_START),
+            .HAS_UPDATE   (HAS_UPDATE)
         ) u_core (
             .clk,
             .rst,

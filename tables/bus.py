@@ -47,6 +47,8 @@ LISTS = (  # lists of codes or bits with their words
     "job_state",
     "job_action",
     "save_action",
+    "update_action",
+    "update_state",
     "job_flag",
 )
 CODES = (
@@ -61,6 +63,8 @@ CODES = (
     "job_state",
     "job_action",
     "save_action",
+    "update_action",
+    "update_state",
 )  # lists of codes; the others are lists of bits
 WORDS = ("cause", "fault", "job_state")  # lists whose words the firmware shows on its panel
 

@@ -42,7 +42,7 @@ PACKAGES = {
 }
 C_ROOTS = ("sw/firmware", "sw/twin")
 FIRMWARE = "sw/firmware/"
-LAYERS = ("made", "core", "planner", "axis", "bus", "calibration", "station", "images")
+LAYERS = ("made", "core", "planner", "axis", "bus", "calibration", "station", "update", "images")
 BESIDE = {"calibration", "station"}  # neither includes the other
 HIDDEN = re.compile(r"\bsys\.path(\[|\.| *\+?=)|\bspec_from_file_location\b")
 

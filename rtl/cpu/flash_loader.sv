@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // flash_loader -- copies the firmware from a serial flash into the memory of the soft core after
-// each reset.
+// each reset; then exchanges single bytes with the flash, for the firmware.
 //
-// latency   64 * (PAUSE + WORDS + 2) cycles from the end of rst to done
-// rate      a word in 64 cycles
+// latency   64 * (PAUSE + WORDS + 2) cycles from the end of rst to done, 16 cycles from send to
+//           answer
+// rate      a word in 64 cycles, then a byte in 17 cycles
 // behaviour SPI mode 0, sclk at half of clk, the highest bit of a byte first. The flash is woken by
 //           command ABh, since an FPGA sends it to sleep after it has read its configuration. After
-//           a pause of PAUSE * 64 cycles command 03h reads WORDS words from address START on; the
-//           first byte of the flash is the lowest byte of a word.
+//           a pause of PAUSE * 64 cycles command 03h reads WORDS words from address START on,
+//           or from 64 KiB behind it for each unit of slot; the first byte of the flash is the
+//           lowest byte of a word. After done, send begins the exchange of a byte, with cs_n low;
+//           with `ends`, cs_n rises after it. send is ignored before done.
 // model     tb/cpu/flash_loader.py, equal in every bit of every cycle
 // proved    A word is stored once in 64 cycles, the addresses follow each other from 0 on, and done
-//           comes after the last one and stays. sclk is low whenever cs_n is high.
+//           comes after the last one and stays. sclk is low whenever cs_n is high. After done
+//           sclk moves only in the 16 cycles after send.
 // proof     depth 4, WORDS = 4, PAUSE = 2
 `default_nettype none
 
@@ -21,6 +25,7 @@ module flash_loader #(
 ) (
     input  wire                      clk,
     input  wire                      rst,
+    input  wire  [              1:0] slot,     // image that is copied, static while it is
     // flash
     output logic                     cs_n,     // pin, low during a command
     output logic                     sclk,     // pin, idles low
@@ -30,10 +35,15 @@ module flash_loader #(
     output logic                     store,    // strobe: word is to be stored at address
     output logic [$clog2(WORDS)-1:0] address,  // number of a word
     output logic [             31:0] word,     // value
-    output logic                     done      // level: all words are stored
+    output logic                     done,     // level: all words are stored
+    // bytes of the firmware
+    input  wire                      send,     // strobe: send data, at least 17 cycles apart
+    input  wire  [              7:0] data,     // byte to the flash
+    input  wire                      ends,     // level: with send, the last byte of a command
+    output logic [              7:0] answer    // byte of the flash, received meanwhile
 );
     localparam int A = $clog2(WORDS);
-    localparam [31:0] WAKE = 32'hAB00_0000, READ = {8'h03, 24'(START)};
+    localparam [31:0] WAKE = 32'hAB00_0000;
 
     if (WORDS < 2 || WORDS != 1 << A) begin : g_check_words
         WORDS_MUST_BE_A_POWER_OF_TWO_FROM_2_UP u_error ();
@@ -53,18 +63,22 @@ module flash_loader #(
     logic   [  5:0] half;  // half periods of sclk since the last 32 bits
     logic   [ 31:0] shifted;  // bits to send from the highest one on, bits received from the lowest
     logic   [A-1:0] count;  // of the periods of 64 cycles in this state
+    logic           releases;  // cs_n rises after this byte
 
     wire            last = half == 6'd63;
+    wire            rests = done && half == '0;  // until the next byte
     wire    [ 31:0] received = {shifted[30:0], miso};
+    wire    [ 31:0] read = {8'h03, 8'(START >> 16) + 8'(slot), 16'(START)};
 
     assign mosi    = shifted[31];
     assign sclk    = half[0] && !cs_n;
     assign store   = state == COPYING && last && !done;
     assign address = count;
     assign word    = {received[7:0], received[15:8], received[23:16], received[31:24]};
+    assign answer  = shifted[7:0];
 
     always_ff @(posedge clk) begin
-        half <= half + 1'b1;
+        if (!rests) half <= half + 1'b1;
         if (half[0]) shifted <= received;
         if (last) begin
             count <= count + 1'b1;
@@ -78,7 +92,7 @@ module flash_loader #(
                     if (count == A'(PAUSE - 1)) begin
                         state   <= COMMANDING;
                         cs_n    <= 1'b0;
-                        shifted <= READ;
+                        shifted <= read;
                     end
                 end
                 COMMANDING: begin
@@ -86,12 +100,16 @@ module flash_loader #(
                     count <= '0;
                 end
                 default: begin
-                    if (&count) begin
-                        done <= 1'b1;
-                        cs_n <= 1'b1;
-                    end
+                    if (&count) done <= 1'b1;
+                    if (&count || done) cs_n <= releases;
                 end
             endcase
+        end
+        if (rests && send) begin
+            half     <= 6'd48;
+            shifted  <= {data, 24'd0};
+            releases <= ends;
+            cs_n     <= 1'b0;
         end
         if (rst) begin
             state   <= WAKING;
@@ -100,6 +118,7 @@ module flash_loader #(
             shifted <= WAKE;
             done    <= 1'b0;
             count   <= '0;
+            releases <= 1'b1;
         end
     end
 
@@ -117,11 +136,16 @@ module flash_loader #(
             assert (stored <= (A + 1)'(WORDS) && done == (stored == (A + 1)'(WORDS)));
             if (state != COPYING) assert (stored == '0 && !done);
             if (state == COPYING && !done) assert (count == stored[A-1:0] && !cs_n);
-            if (state == PAUSING || done) assert (cs_n);
+            if (state == PAUSING) assert (cs_n);
+            if (done) assert (half == '0 || half >= 6'd48);
+            if (done && half == '0) assert (!sclk);
+            if (!done) assert (releases);
             if (state == PAUSING) assert (count < A'(PAUSE));
             if (state == COMMANDING || state == WAKING) assert (!cs_n);
             if (stored != '0 && !done) assert (since == {1'b0, half} + 7'd1);
             if (store && stored != '0) assert (since == 7'd64);
+            if ($past(done) && !$past(rst) && half == '0 && $past(half) == '0)
+                assert (cs_n == $past(cs_n));
         end
         if (past && !$past(rst) && $past(done)) assert (done && !store);
         cover (past && sclk && mosi);

@@ -7,19 +7,29 @@
 // rate      An instruction takes 36 to 38 cycles, one with an access to memory, a jump, a branch, a
 //           comparison or a shift 70 to 104.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
-//           8000_0000 (64 KiB, whole words only). Any other access stops the core: trap is high
-//           until rst. After rst flash_loader copies PROGRAM_BYTES from a serial flash into the
-//           memory, then the core starts at address 0. The memory has one port for reading and
-//           writing and no contents at power-up, so it may be a single-port RAM (SB_SPRAM256KA).
+//           8000_0000 (64 KiB, whole words only), the port of the flash at 8001_0000, whole words
+//           as well. Any other access stops the core: trap is high until the next start. After rst
+//           flash_loader copies PROGRAM_BYTES from a serial flash into the memory, then the core
+//           starts at address 0. The memory has one port for reading and writing and no contents at
+//           power-up, so it may be a single-port RAM (SB_SPRAM256KA).
 //           An illegal instruction is not detected, and a misaligned access never ends.
+//           The port of the flash has two words; without HAS_UPDATE they read 0 and ignore writes.
+//           At 8001_0000, a write sends bits 7..0, and bit 8 ends the command; a read returns the
+//           byte of the flash in bits 7..0, and the image that was copied in bits 9..8.
+//           At 8001_0004, a write with bit 2 copies image 0 to 3 (bits 1..0) and starts the core
+//           again, and bit 3 puts it on trial; a write without bit 3 ends the trial. A read returns
+//           FLASH_START. A trial that is not ended within 2^TRIAL_BITS cycles copies image 0 and
+//           starts the core again.
 // source    SERV, from the package pythondata_cpu_serv
 // model     tb/cpu/serial_core.py, the results of the program tb/cpu/serial_test.c
 `default_nettype none
 
 module serial_core #(
-    parameter int MEMORY_BYTES  = 65536,  // bytes, a multiple of 1024
+    parameter int MEMORY_BYTES = 65536,  // bytes, a multiple of 1024
     parameter int PROGRAM_BYTES = 32768,  // bytes that are copied, a power of two
-    parameter int FLASH_START   = 131072  // byte address of the program in the flash
+    parameter int FLASH_START = 131072,  // byte address of the program in the flash
+    parameter int HAS_UPDATE = 0,  // 1: build the port of the flash, and the choice of an image
+    parameter int TRIAL_BITS = 28  // a trial takes 2^TRIAL_BITS cycles at most
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -43,29 +53,41 @@ module serial_core #(
     wire [31:0] fetch_address, data_address, memory_rdata, loaded_word;
     wire [  3:0] bytes;
     wire [P-3:0] loaded_at;
-    // the memory has answered; the registers will answer in the next cycle, have answered
+    // memory or port have answered; the registers will answer in the next cycle, have answered
     logic fetched, awaited, answered;
+    logic restart, trial;
+    logic [1:0] slot;
+    logic [TRIAL_BITS-1:0] trial_time;
+    wire [7:0] answer;
 
-    wire         valid = fetch || load_or_store;
-    wire [ 31:0] access = fetch ? fetch_address : data_address;
-    wire         in_memory = access < 32'(MEMORY_BYTES);
-    wire         in_registers = !fetch && data_address[31:16] == 16'h8000 && (&bytes || !storing);
-    wire         done = fetched || answered;
-    wire         puts = load_or_store && storing && in_memory && !fetched;
+    wire valid = fetch || load_or_store;
+    wire [31:0] access = fetch ? fetch_address : data_address;
+    wire in_memory = access < 32'(MEMORY_BYTES);
+    wire in_registers = !fetch && data_address[31:16] == 16'h8000 && (&bytes || !storing);
+    wire in_port = !fetch && data_address[31:16] == 16'h8001 && (&bytes || !storing);
+    wire done = fetched || answered;
+    wire puts = load_or_store && storing && in_memory && !fetched;
+    wire orders = HAS_UPDATE != 0 && load_or_store && storing && in_port && !fetched;
+    wire sends = orders && !data_address[2];
+    wire controls = orders && data_address[2];
+    wire overdue = &trial_time;
+    wire reset = rst || restart;
+    wire [31:0] named = data_address[2] ? 32'(FLASH_START) : {22'd0, slot, answer};
+    wire [31:0] port_rdata = HAS_UPDATE != 0 ? named : '0;
     wire [A-3:0] at = loaded ? access[A-1:2] : (A - 2)'(loaded_at);
 
-    wire         free = !(select || awaited || answered);
+    wire free = !(select || awaited || answered);
 
     assign write   = storing;
     assign address = data_address[15:0];
 
     always_ff @(posedge clk) begin
-        fetched  <= valid && in_memory && !fetched && !trap;
+        fetched  <= valid && (in_memory || in_port) && !fetched && !trap;
         select   <= valid && in_registers && ready && free && !trap;
         awaited  <= select;
         answered <= awaited;
-        if (valid && !in_memory && !in_registers) trap <= 1'b1;
-        if (rst) begin
+        if (valid && !in_memory && !in_registers && !in_port) trap <= 1'b1;
+        if (reset) begin
             fetched  <= 1'b0;
             select   <= 1'b0;
             awaited  <= 1'b0;
@@ -74,12 +96,28 @@ module serial_core #(
         end
     end
 
+    // which image runs, and whether it is on trial
+    always_ff @(posedge clk) begin
+        restart    <= overdue || controls && wdata[2];
+        trial_time <= trial ? trial_time + 1'b1 : '0;
+        if (controls) trial <= wdata[3];
+        if (controls && wdata[2]) slot <= wdata[1:0];
+        if (overdue) {trial, slot, trial_time} <= '0;
+        if (rst) begin
+            restart    <= 1'b0;
+            trial      <= 1'b0;
+            slot       <= '0;
+            trial_time <= '0;
+        end
+    end
+
     flash_loader #(
         .WORDS(PROGRAM_BYTES / 4),
         .START(FLASH_START)
     ) u_loader (
         .clk,
-        .rst,
+        .rst    (reset),
+        .slot,
         // flash
         .cs_n   (flash_cs_n),
         .sclk   (flash_sclk),
@@ -89,7 +127,12 @@ module serial_core #(
         .store  (loads),
         .address(loaded_at),
         .word   (loaded_word),
-        .done   (loaded)
+        .done   (loaded),
+        // port
+        .send   (sends),
+        .data   (wdata[7:0]),
+        .ends   (wdata[8]),
+        .answer
     );
     node_memory #(
         .BYTES(MEMORY_BYTES)
@@ -108,7 +151,7 @@ module serial_core #(
         .RF_WIDTH      (2)
     ) u_core (
         .clk,
-        .i_rst       (rst || !loaded),
+        .i_rst       (reset || !loaded),
         .i_timer_irq (1'b0),
         .o_ibus_adr  (fetch_address),
         .o_ibus_cyc  (fetch),
@@ -119,7 +162,7 @@ module serial_core #(
         .o_dbus_sel  (bytes),
         .o_dbus_we   (storing),
         .o_dbus_cyc  (load_or_store),
-        .i_dbus_rdt  (answered ? rdata : memory_rdata),
+        .i_dbus_rdt  (answered ? rdata : in_port ? port_rdata : memory_rdata),
         .i_dbus_ack  (done && load_or_store),
         // no extension:
         // verilator lint_off PINCONNECTEMPTY

@@ -69,6 +69,7 @@ def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
         "MEMORY_BYTES": 1024 * machine.memory_kib,
         "PROGRAM_BYTES": 32768,
         "FLASH_START": 131072,
+        "HAS_UPDATE": int(machine.update),
         **board.part.node,
     }
     if machine.core == "soft":

@@ -135,6 +135,7 @@ class Machine:
     image: str  # firmware; a relay has none
     core: str
     memory_kib: int
+    update: bool  # of the firmware over the bus, into the flash of a serial core
     address: int  # on the bus, where the board has no switches
     filters: int
     segments: int
@@ -274,6 +275,9 @@ def load(path: Path) -> Machine:
     core = "" if is_relay else kind.take("core", str, "soft")
     if core not in ("", "soft", "serial"):
         raise kind.misfit(f"core {core!r} is none of soft, serial")
+    update = not is_relay and kind.take("update", bool, False)
+    if update and core != "serial":
+        raise kind.misfit("update needs core 'serial': the firmware of the other comes out of RAM")
     machine = Machine(
         name=path.stem,
         file=table.file,
@@ -282,6 +286,7 @@ def load(path: Path) -> Machine:
         image="" if is_relay else kind.take("image", str),
         core=core,
         memory_kib=0 if is_relay else kind.take("memory_kib", int),
+        update=update,
         address=1 if is_relay else kind.take("address", int),
         filters=0 if is_relay else kind.take("filters", int, 0),
         segments=0 if is_relay else kind.take("segments", int, 0),

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Build the firmware: build/firmware/firmware.elf, .bin and .hex; another image than `axis` and
-another number of axes have names of their own.
+"""Build the firmware: build/firmware/firmware.elf, .bin, .hex and .update; another image than
+`axis` and another number of axes have names of their own.
 
 An image is the firmware of one kind of node. It consists of the parts that its image_NAME.c lists;
 the linker drops what they do not reach. Its arrays have as many elements as the node has axes.
@@ -9,6 +9,7 @@ The compiler is zig (PyPI ziglang, of the running Python), or GNU with CROSS=ris
 in the environment.
 The .hex is for $readmemh: one 32-bit word per line, little endian in memory, filled with zeros up
 to the size of the memory.
+The .update is for `moire update`: one line of JSON that says for which nodes it is, then the .bin.
 The .parts lists how many bytes each source takes. Nothing is built if nothing has changed. The exit
 code is 1, with one line of explanation, if a tool is missing, a source is wrong or the image does
 not fit: then the line says by how many bytes, and which parts are the largest.
@@ -17,6 +18,7 @@ not fit: then the line says by how many bytes, and which parts are the largest.
 import argparse
 import hashlib
 import importlib.util
+import json
 import os
 import re
 import shutil
@@ -24,6 +26,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import zlib
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -204,12 +207,15 @@ def sources_of(name: str, folder: Path = HERE) -> list[Path]:
     return sources
 
 
-def defines_of(name: str, axes: int | None = None) -> list[str]:
-    """Macros of an image: it serves as many axes as it can, if no number is named."""
+def defines_of(name: str, axes: int | None = None, core: str = "soft") -> list[str]:
+    """Macros of an image: it serves as many axes as it can, if no number is named. The firmware of
+    a serial core comes out of a flash.
+    """
     image = IMAGES[name]
     return [
         f"-DHARDWARE_AXES={axes or image.most_axes}u",
         f"-DHARDWARE_DRIVES={int(image.drives)}",
+        f"-DHARDWARE_FLASH={int(core == 'serial')}",
     ]
 
 
@@ -222,6 +228,26 @@ def stem_of(name: str, axes: int, core: str = "soft") -> str:
 
 def flags_of(path: Path) -> list[str]:
     return [FAST if path.name in HOT else SMALL]
+
+
+def update_file(program: bytes, name: str, axes: int, core: str, memory: int) -> bytes:
+    """The content of a file for `moire update`: a line of JSON, then the program."""
+    crcs = {}
+    for key, header in (("MAP_CRC", "registers.h"), ("PROTOCOL_CRC", "bus_protocol.h")):
+        found = re.search(rf"#define {key}\s+(0x\w+)u", (HERE / "made" / header).read_text())
+        assert found, f"{header} has no {key}"
+        crcs[key.lower()] = int(found[1], 16)
+    about = {
+        "moire_firmware": 1,
+        "image": name,
+        "axes": axes,
+        "core": core,
+        "memory": memory,
+        **crcs,
+        "bytes": len(program),
+        "crc": zlib.crc32(program),
+    }
+    return json.dumps(about).encode() + b"\n" + program
 
 
 def fingerprint(sources: Iterable[Path], command: list[str], memory: int) -> str:
@@ -257,14 +283,14 @@ def build(
     if not 1 <= axes <= image.most_axes:
         raise BuildError(f"the image {name} serves 1 to {image.most_axes} axes, not {axes}")
     command, libraries = compiler(core)
-    command += defines_of(name, axes)
+    command += defines_of(name, axes, core)
     sources = [*sources_of(name), LINK, HERE / "build.py"]
     stem = stem_of(name, axes, core)
-    elf, binary, text, parts, note = (
-        out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "parts", "note")
+    elf, binary, text, update, parts, note = (
+        out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "update", "parts", "note")
     )
     state = fingerprint(sources, command, memory)
-    if not force and all(path.exists() for path in (elf, binary, text, parts, note)):
+    if not force and all(path.exists() for path in (elf, binary, text, update, parts, note)):
         old_state, _, report = note.read_text().partition("\n")
         if old_state == state:
             return report.strip()
@@ -311,6 +337,7 @@ def build(
         )
     content, program = contents(segments, memory)
     binary.write_bytes(content[:program])
+    update.write_bytes(update_file(content[:program], name, axes, core, memory))
     text.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
     parts.write_text("".join(f"{size:7} {source}\n" for source, size in sizes.items() if size))
     report = (

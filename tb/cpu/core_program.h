@@ -7,6 +7,9 @@ typedef unsigned short u16;
 typedef unsigned char u8;
 
 #define REGISTERS 0x80000000u
+#ifndef BEHIND
+#define BEHIND 0x80010000u /* the first address behind the registers that is wrong */
+#endif
 #define REGISTER(offset) (*(volatile u32*)(REGISTERS + (offset)))
 #define A REGISTER(0x000)
 #define B REGISTER(0x004)
@@ -63,7 +66,7 @@ static inline void access_wrongly(u32 order) {
     case 0: break;
     case 1: RESULT = *(volatile u32*)MEMORY_BYTES; break;
     case 2: *(volatile u32*)MEMORY_BYTES = 1; break;
-    case 3: *(volatile u32*)(REGISTERS + 0x10000) = 1; break;
+    case 3: *(volatile u32*)BEHIND = 1; break;
     case 4: RESULT = *(volatile u32*)0xFFFFFFFCu; break;
     case 5: *(volatile u8*)REGISTERS = 1; break;
     case 6: *(volatile u16*)(REGISTERS + 2) = 1; break;

@@ -2,10 +2,13 @@
  * The program that tb/cpu/test_serial_core.py runs on the serial core. It takes two operands from
  * the registers, applies every instruction of rv32i that a compiler uses and each width of memory
  * access to them, and writes the results to the registers, one after the other. Then it makes the
- * wrong access that the register ORDER selects; all orders above 0 must trap.
+ * wrong access that the register ORDER selects; all orders from 1 to 8 must trap. The orders 16 and
+ * 17 use the port of the flash.
  */
+#define BEHIND 0x80020000u /* behind the port of the flash */
 #include "core_program.h"
 
+#define PORT(offset) (*(volatile u32*)(0x80010000u + (offset)))
 #define TEXT_OF(x) #x
 #define TEXT(x) TEXT_OF(x)
 #define ONE(mnemonic, number)                                                     \
@@ -67,6 +70,12 @@ void main(void) {
         switch (order) {
         case 7: ((void (*)(void))REGISTERS)(); break;
         case 8: ((void (*)(void))0x40000000)(); break;
+        case 16: /* a byte for the flash: B */
+            PORT(0) = b;
+            RESULT = PORT(0);
+            RESULT = PORT(4);
+            break;
+        case 17: PORT(4) = b; break; /* another image */
         default: access_wrongly(order); break;
         }
     }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """flash_loader: each pin and each stored word against the model in every cycle, with a flash behind
-it that sleeps until it is woken, and with random levels; reset in the middle.
+it that sleeps until it is woken, and with random levels; reset in the middle; then single bytes of
+the firmware.
 """
 
 import random
@@ -37,20 +38,23 @@ class Flash:
 
 
 class Bench:
-    def __init__(self, dut):
-        self.dut, self.model, self.words = dut, FlashLoader(WORDS, START, PAUSE), {}
+    def __init__(self, dut, slot=0):
+        self.dut, self.slot, self.words = dut, slot, {}
+        self.model = FlashLoader(WORDS, START, PAUSE, slot)
 
     async def begin(self):
-        await start(self.dut, miso=1)
+        await start(self.dut, miso=1, slot=self.slot, send=0, data=0, ends=0)
         await self.clk(1, rst=1)
         return self
 
-    async def clk(self, miso, rst=0):
+    async def clk(self, miso, rst=0, send=None):
         """One cycle; returns the levels of cs_n, sclk and mosi in it."""
         dut = self.dut
-        dut.miso.value, dut.rst.value = miso, rst
+        dut.miso.value, dut.rst.value, dut.send.value = miso, rst, int(send is not None)
+        if send:
+            dut.data.value, dut.ends.value = send
         await RisingEdge(dut.clk)
-        self.model.step(miso, rst)
+        self.model.step(miso, rst, send)
         await FallingEdge(dut.clk)
         cs_n, sclk, done, mosi = self.model.pins()
         got = tuple(int(port.value) for port in (dut.cs_n, dut.sclk, dut.done))
@@ -99,6 +103,34 @@ async def a_reset_in_the_middle_begins_again(dut):
     for _ in range(64 * (PAUSE + WORDS + 3)):
         await bench.clk(random.getrandbits(1))
     assert int(dut.done.value)
+
+
+@cocotb.test()
+async def each_slot_is_copied_from_64_kib_behind_the_last_one(dut):
+    for slot in (1, 3):
+        bench = await Bench(dut, slot).begin()
+        content = [random.getrandbits(8) for _ in range(4 * WORDS + 1)]
+        flash, miso = Flash(content, START + 65536 * slot), 1
+        while not bench.model.done:
+            miso = flash.step(*await bench.clk(miso))
+        assert bench.words[0] == int.from_bytes(bytes(content[:4]), "little")
+
+
+@cocotb.test()
+async def latency_is_16_cycles_for_a_byte_of_the_firmware_which_is_ignored_before_done(dut):
+    bench = await Bench(dut).begin()
+    while not bench.model.done:
+        await bench.clk(random.getrandbits(1), send=(random.getrandbits(8), 1))
+    for n in range(40):
+        data, ends = random.choice([0, 255, random.getrandbits(8)]), int(n % 5 == 4)
+        await bench.clk(random.getrandbits(1), send=(data, ends))
+        for _ in range(16 + random.choice([0, 0, 1, 30])):
+            await bench.clk(random.getrandbits(1))
+        assert int(dut.answer.value) == bench.model.answer(), f"byte {n}"
+        assert int(dut.cs_n.value) == ends
+    await bench.clk(0, send=(0xA5, 0))
+    await bench.clk(0, rst=1)
+    assert not int(dut.done.value), "a reset copies again"
 
 
 def test_flash_loader():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """serial_core: a compiled program comes out of a flash, executes every instruction and access width
 on operands from the register bus, then makes every wrong access. Its results must be those of
-tb/cpu/serial_core.py.
+tb/cpu/serial_core.py. Through the port of the flash it sends bytes and starts other images.
 """
 
 import random
@@ -119,7 +119,53 @@ async def a_register_access_waits_until_the_registers_are_ready(dut):
     assert not int(dut.trap.value)
 
 
+async def started(registers, slot):
+    """A load from the flash, whose address the flash checks, ends early; the program starts."""
+    registers.flash.start = START + 65536 * slot
+    await registers.until(lambda: not int(registers.dut.loaded.value), 20000)
+    registers.words[8] = 0
+    registers.written.clear()
+    await registers.until(lambda: len(registers.flash.bits) > 32, BOOT)
+    registers.dut.u_loader.count.value = PROGRAM // 4 - 1
+    await registers.until(lambda: registers.taken(0x10), 3000)
+
+
+@cocotb.test()
+async def the_port_exchanges_a_byte_with_the_flash_and_names_image_and_start(dut):
+    registers = await begin(dut)
+    for ends in (0, 1):
+        registers.words[4], registers.words[8] = ends << 8 | 0xA5, 16
+        registers.flash.out = ends
+        registers.written.clear()
+        await registers.until(lambda: START in registers.taken(0xFFFC), 30000)
+        await registers.until(lambda: int(dut.u_loader.rests.value))
+        at = registers.taken(0xFFFC).index(START)
+        assert registers.taken(0xFFFC)[at - 1] == 0xFF * ends
+        assert int(dut.flash_cs_n.value) == ends
+        if not ends:
+            assert registers.flash.bits[-8:] == [1, 0, 1, 0, 0, 1, 0, 1]
+            registers.flash.bits = []
+
+
+@cocotb.test()
+async def another_image_starts_and_one_on_trial_is_replaced_by_image_0_in_time(dut):
+    registers = await begin(dut)
+    registers.words[4], registers.words[8] = 0b1110, 17  # image 2, on trial
+    await started(registers, 2)
+    assert (int(dut.slot.value), int(dut.trial.value)) == (2, 1)
+    registers.words[4], registers.words[8] = 0, 17
+    await registers.until(lambda: not int(dut.trial.value))
+    await registers.clk()
+    await registers.clk()
+    assert int(dut.trial_time.value) == 0 and int(dut.slot.value) == 2, "the image is kept"
+    dut.trial.value = 1
+    dut.trial_time.value = 2**28 - 3
+    await started(registers, 0)
+    assert (int(dut.slot.value), int(dut.trial.value)) == (0, 0)
+
+
 def test_serial_core():
     content = core_program.content("serial", BYTES, PROGRAM)
     FLASH.write_bytes(content)
-    run("serial_core", __file__, MEMORY_BYTES=BYTES, PROGRAM_BYTES=PROGRAM, FLASH_START=START)
+    parameters = {"MEMORY_BYTES": BYTES, "PROGRAM_BYTES": PROGRAM, "FLASH_START": START}
+    run("serial_core", __file__, HAS_UPDATE=1, **parameters)

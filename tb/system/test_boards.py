@@ -229,6 +229,17 @@ def test_the_flash_has_the_firmware_where_the_node_reads_it(packed):
     assert found == b"bitstream" + b"\xff" * (0x20000 - 9) + b"firmware"
 
 
+def test_updates_of_the_firmware_are_built_on_request_and_need_the_serial_core(tmp_path):
+    more = ("memory_kib = 64", "memory_kib = 64\nupdate = true")
+    box = edited(tmp_path, "constraints/machines/counter_box.toml", more)
+    design = fit(board.named("icebreaker"), machine.load(box))
+    assert design.parameters["HAS_UPDATE"] == 1
+    path = edited(tmp_path, MILL, ("[node]", "[node]\nupdate = true"))
+    assert refusal(lambda: machine.load(path)) == (
+        f"{path}: [node] update needs core 'serial': the firmware of the other comes out of RAM"
+    )
+
+
 def test_a_bitstream_that_reaches_into_the_firmware_is_refused(packed):
     with pytest.raises(SynthesisError, match="the bitstream has 131073 bytes, the firmware is at"):
         packed(b"x" * 131073)

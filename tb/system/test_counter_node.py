@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node of an iCE40 UP5K as it ships: four axes that count, on the serial core, whose firmware
-comes out of a flash. It serves the host at its own clock and baud rate.
+comes out of a flash and can be replaced there. It serves the host at its own clock and baud rate.
 """
 
 import random
@@ -8,14 +8,17 @@ import random
 import pytest
 
 from moire.client.bus import Bus
+from moire.client.update import ACTIONS, Firmware, update_state, wait_for, write
 from moire.errors import Refused
+from moire.made.bus_tables import PROTOCOL_CRC
+from moire.made.registers import MAP_CRC
 from tb.bench import seed
 from twin import Axis, Node, Twin, TwinTransport, build
 
 AXES = 4
 CLK_HZ = 20_000_000
 BAUD = 115_200
-NODE = {  # as constraints/machines/counter_box.toml builds it
+NODE = {  # as constraints/machines/counter_box.toml builds it, with updates of the firmware
     "FILTERS": 0,
     "HAS_SINE": 0,
     "HAS_COMPARE": 0,
@@ -23,9 +26,11 @@ NODE = {  # as constraints/machines/counter_box.toml builds it
     "HAS_VELOCITY": 0,
     "HAS_DRIVE": 0,
     "HAS_SERIAL_CORE": 1,
+    "HAS_UPDATE": 1,
 }
 START_S = 0.06  # 26 ms to copy 32 KiB, and the start of the firmware
 ANSWER_S = 0.012  # longest time from a request for the status to the answer's last character
+PROGRAM = bytes(range(70))  # of an update
 PERIOD = "4um"  # of the scale of S3: 4 counts of 1 um
 
 
@@ -96,6 +101,20 @@ def test_an_answer_takes_a_few_milliseconds(node):
         longest = max(longest, twin.time() - begin)
     print(f"longest exchange: {longest * 1e3:.1f} ms")
     assert longest < ANSWER_S
+
+
+def test_new_firmware_is_written_into_the_flash_and_read_back(node):
+    """Up to the trial, whose firmware would need minutes to be sent."""
+    _, axes = node
+    firmware = Firmware("counter", AXES, "serial", 65536, MAP_CRC, PROTOCOL_CRC, PROGRAM)
+    bus = axes[0].node.bus
+    assert update_state(bus, 1).words == "its factory firmware"
+    sent = dict(bytes=len(PROGRAM), crc=firmware.crc, map_crc=MAP_CRC, memory=65536, axes=AXES)
+    bus.request(1, "begin_update", **sent)
+    wait_for(bus, 1, "writing")
+    write(bus, 1, PROGRAM, lambda words, share: None)
+    bus.request(1, "update", action=ACTIONS["check"])
+    wait_for(bus, 1, "checked")
 
 
 def test_what_needs_a_drive_is_refused(node):

@@ -18,6 +18,9 @@
 #ifndef HARDWARE_DRIVES
 #define HARDWARE_DRIVES 1  // 0: the nodes of this image measure and have no drives
 #endif
+#ifndef HARDWARE_FLASH
+#define HARDWARE_FLASH 0  // 1: the firmware comes out of a flash and can reach it
+#endif
 
 // A position of 48 bits.
 static inline int64_t axis_read_position(unsigned axis, uint32_t offset) {

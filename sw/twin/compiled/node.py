@@ -41,6 +41,7 @@ FULL_SPEED = 1 << 16  # of the feed override
 SLIDE = 30 * PERIOD  # past a closed switch
 BACKLASH = PERIOD // 2  # a switch opens so far from where it closed
 INDEX, SOFTWARE = 1 << 0, 1 << 2  # bits of capture_sources
+END_OF_MAP = 1 << 16  # the port of the flash begins here
 ALWAYS_LATCHED = FAULT["estop"] | FAULT["drive"] | FAULT["cpu"]
 
 
@@ -444,6 +445,16 @@ class FeedbackChannel:
                 self.points, self.written, self.loads = self.written, {}, self.loads + 1
 
 
+class FlashPort(Protocol):
+    """The port of a serial core to its flash, behind the register map."""
+
+    def read(self, offset: int) -> int:
+        """A word of the port."""
+
+    def write(self, offset: int, value: int) -> None:
+        """Write a word of the port."""
+
+
 class Peripherals(Protocol):
     """The devices behind the registers of the block `peripherals`."""
 
@@ -468,9 +479,11 @@ class CompiledNode:
         image: str = "axis",
         peripherals: Peripherals | None = None,
         absent: Sequence[str] = (),
+        flash: FlashPort | None = None,
     ) -> None:
         """Power up. `absent` names what is not built, as in the register axis.built; a
-        `map_crc` other than that of the firmware is a bitstream that does not fit it.
+        `map_crc` other than that of the firmware is a bitstream that does not fit it. A node with
+        a `flash` has the serial core.
         """
         self.axes, self.address, self.map_crc, self.clk = (
             list(axes) or [Axis()],
@@ -487,7 +500,7 @@ class CompiledNode:
             self.built &= ~DEFINES[f"AXIS_BUILT_{name.upper()}_MASK"]
         self.feedback_channels = [FeedbackChannel() for _ in self.axes]
         self.actuators: list[dict[int, int]] = [{} for _ in self.axes]  # words by their offset
-        self.peripherals = peripherals
+        self.peripherals, self.flash = peripherals, flash
         self.received: deque[int] = deque()
         self.sent: list[int] = []
         self.word: dict[int, int] = {}
@@ -497,13 +510,15 @@ class CompiledNode:
             READ(self.read),
             WRITE(self.write),
         )  # kept alive as long as the firmware may call
-        self.firmware = power_up(image, self)
+        self.firmware = power_up(image, self, "serial" if flash else "soft")
         self.firmware.register_bridge(*self.answers)
         self.firmware.firmware_start()
 
     def read(self, offset: int) -> int:
         """A register, as the firmware reads it."""
         d = DEFINES
+        if offset >= END_OF_MAP:
+            return self.flash.read(offset - END_OF_MAP) if self.flash else 0
         if offset >= d["ACTUATOR_BASE"]:
             return self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]].get(
                 offset % d["ACTUATOR_STRIDE"], 0
@@ -542,7 +557,10 @@ class CompiledNode:
     def write(self, offset: int, value: int) -> None:
         """Write a register, as the firmware does."""
         d = DEFINES
-        if offset >= d["ACTUATOR_BASE"]:
+        if offset >= END_OF_MAP:
+            if self.flash:
+                self.flash.write(offset - END_OF_MAP, value)
+        elif offset >= d["ACTUATOR_BASE"]:
             self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]][
                 offset % d["ACTUATOR_STRIDE"]
             ] = value

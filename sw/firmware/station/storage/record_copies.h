@@ -10,6 +10,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "core/crc32.h"
+
 struct record_copies {
     uint32_t generation[2];  // of each copy; 0: it is not whole
     bool blank[2];           // the copy was never written
@@ -29,9 +31,7 @@ uint32_t record_copies_next_generation(void);
 // The copy that is not the newest has been written and verified: it becomes the newest.
 void record_copies_saved(struct record_copies* copies, uint32_t generation);
 
-// The CRC-32 (IEEE 802.3) continued by `count` bytes; it begins with UINT32_MAX, and what is stored
-// is its complement. Takes about 100 cycles a byte: do not pass more than CRC_STEP bytes a poll.
+// Takes about 100 cycles a byte of a CRC: do not pass more than CRC_STEP bytes a poll.
 #define CRC_STEP 16u
-uint32_t crc32_continue(uint32_t crc, const void* bytes, unsigned count);
 
 #endif

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from moire.client.axis import Axis
 from moire.client.names import CAUSE_CODES
 from moire.client.records import Progress, Status
+from moire.client.update import Firmware, UpdateState, update
+from moire.client.update import Progress as UpdateProgress
 from moire.errors import OutOfRange, Refused, UnknownName, with_more
 from moire.made.registers import FIELDS, Field
 
@@ -65,6 +68,18 @@ class Node:
     def counters(self) -> dict[str, int]:
         """What the node has met on the bus: frames, errors and others, by name."""
         return self.request("counters")
+
+    def update(
+        self, firmware: Firmware | str | Path, progress: UpdateProgress | None = None
+    ) -> UpdateState:
+        """Writes new firmware into the node and starts it; see moire.client.update.
+
+        The firmware may be a file. Its axes must be set up again afterwards, as after power-up.
+        """
+        state = update(self.bus, self.address, firmware, progress)
+        self.identity = self.bus.identify(self.address)
+        self.axes.clear()
+        return state
 
     # registers
 

@@ -9,6 +9,7 @@ SECTIONS = {  # of the help: every command, and the module of this package that 
         "built": "built",
         "counters": "nodes",
         "baud": "nodes",
+        "update": "update",
         "selftest": "fault",
         "register": "register",
     },
