@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x51F95794u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x22F96A26u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -106,6 +106,16 @@ enum bus_cause {
     // the saved values were not read: the EEPROM did not answer at power-up, the defaults are in
     // use
     BUS_CAUSE_SAVED_NOT_READ = 71,
+    BUS_CAUSE_FIRMWARE_TOO_LONG = 72,    // the firmware is too long: the node has no room for it
+    // this is firmware of another node: another register map, more memory, or too few axes
+    BUS_CAUSE_FIRMWARE_OF_OTHER_NODE = 73,
+    // the firmware is damaged: its CRC-32 is wrong in the flash; send it again
+    BUS_CAUSE_FIRMWARE_DAMAGED = 74,
+    // firmware is on trial: confirm it first, or switch the node off and on
+    BUS_CAUSE_FIRMWARE_ON_TRIAL = 75,
+    BUS_CAUSE_DRIVE_ON = 76,    // a drive is on: switch all drives of the node off first
+    // the flash failed: it does not answer, or did not store the data
+    BUS_CAUSE_FLASH_FAILED = 77,
 };
 
 enum bus_fault {    // bits
@@ -272,6 +282,23 @@ enum bus_save_action {
     BUS_SAVE_ACTION_CLEAR = 1,    // use the defaults from the next power-up on
 };
 
+enum bus_update_action {
+    // compare the new firmware in the flash with its CRC-32, and enter it in the flash
+    BUS_UPDATE_ACTION_CHECK = 0,
+    BUS_UPDATE_ACTION_RUN = 1,    // start the new firmware on trial, 0.1 s after the reply
+    // keep the firmware that is on trial: it runs from the next power-up on
+    BUS_UPDATE_ACTION_CONFIRM = 2,
+};
+
+enum bus_update_state {
+    BUS_UPDATE_STATE_IDLE = 0,    // no update is in progress
+    BUS_UPDATE_STATE_ERASING = 1,    // the flash is being erased
+    BUS_UPDATE_STATE_WRITING = 2,    // the new firmware is expected
+    BUS_UPDATE_STATE_CHECKING = 3,    // the new firmware is being checked
+    BUS_UPDATE_STATE_CHECKED = 4,    // the new firmware is complete: it can be started
+    BUS_UPDATE_STATE_STARTING = 5,    // the new firmware will be started
+};
+
 enum bus_job_flag {    // bits
     BUS_JOB_FLAG_EEPROM = 1 << 0,    // the EEPROM answers
     BUS_JOB_FLAG_KEYPAD = 1 << 1,    // the keypad answers
@@ -357,7 +384,13 @@ enum bus_job_flag {    // bits
     X(68, "the saved values are damaged") \
     X(69, "the saved values are from another build") \
     X(70, "some saved values are not allowed") \
-    X(71, "the saved values were not read")
+    X(71, "the saved values were not read") \
+    X(72, "the firmware is too long") \
+    X(73, "this is firmware of another node") \
+    X(74, "the firmware is damaged") \
+    X(75, "firmware is on trial") \
+    X(76, "a drive is on") \
+    X(77, "the flash failed")
 
 // X(code, words), up to a colon
 #define BUS_FAULT_WORDS(X) \
@@ -509,6 +542,17 @@ enum bus_operation {
     // the saved values, or why there are none; writing is 1 while the EEPROM is written or read;
     // damaged 1: one copy was damaged
     BUS_OPERATION_SAVED_SETTINGS = 59,
+    // progress of an update; cause: how its last step ended; image that runs: 0 the factory image,
+    // 1 or 2 an updated one, with its CRC-32; trial 1: it is not confirmed; longest: bytes for
+    // which there is room
+    BUS_OPERATION_UPDATE_STATE = 60,
+    // erase the image that is not in use, for new firmware of so many bytes with this CRC-32, made
+    // for this register map, memory and number of axes; refused while a drive is on
+    BUS_OPERATION_BEGIN_UPDATE = 61,
+    BUS_OPERATION_WRITE_UPDATE = 62,    // write block number `block` of the new firmware, 32 bytes
+    // check, start or confirm the new firmware (an update_action); update_state reports the end;
+    // refused while a drive is on
+    BUS_OPERATION_UPDATE = 63,
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.
@@ -865,6 +909,35 @@ enum bus_operation {
 #define BUS_SAVED_SETTINGS_REPLY_DAMAGED 5u    // u8
 #define BUS_SAVED_SETTINGS_REPLY_GENERATION 6u    // u32
 #define BUS_SAVED_SETTINGS_REPLY_VALUES 10u    // u16
+#define BUS_UPDATE_STATE_REQUEST_LENGTH 2u
+#define BUS_UPDATE_STATE_REPLY_LENGTH 15u
+#define BUS_UPDATE_STATE_REPLY_STATE 3u    // u8
+#define BUS_UPDATE_STATE_REPLY_ENDED 4u    // u8
+#define BUS_UPDATE_STATE_REPLY_IMAGE 5u    // u8
+#define BUS_UPDATE_STATE_REPLY_TRIAL 6u    // u8
+#define BUS_UPDATE_STATE_REPLY_CRC 7u    // u32
+#define BUS_UPDATE_STATE_REPLY_LONGEST 11u    // u32
+#define BUS_BEGIN_UPDATE_REQUEST_LENGTH 19u
+#define BUS_BEGIN_UPDATE_REQUEST_BYTES 2u    // u32
+#define BUS_BEGIN_UPDATE_REQUEST_CRC 6u    // u32
+#define BUS_BEGIN_UPDATE_REQUEST_MAP_CRC 10u    // u32
+#define BUS_BEGIN_UPDATE_REQUEST_MEMORY 14u    // u32
+#define BUS_BEGIN_UPDATE_REQUEST_AXES 18u    // u8
+#define BUS_BEGIN_UPDATE_REPLY_LENGTH 3u
+#define BUS_WRITE_UPDATE_REQUEST_LENGTH 36u
+#define BUS_WRITE_UPDATE_REQUEST_BLOCK 2u    // u16
+#define BUS_WRITE_UPDATE_REQUEST_WORD_0 4u    // u32
+#define BUS_WRITE_UPDATE_REQUEST_WORD_1 8u    // u32
+#define BUS_WRITE_UPDATE_REQUEST_WORD_2 12u    // u32
+#define BUS_WRITE_UPDATE_REQUEST_WORD_3 16u    // u32
+#define BUS_WRITE_UPDATE_REQUEST_WORD_4 20u    // u32
+#define BUS_WRITE_UPDATE_REQUEST_WORD_5 24u    // u32
+#define BUS_WRITE_UPDATE_REQUEST_WORD_6 28u    // u32
+#define BUS_WRITE_UPDATE_REQUEST_WORD_7 32u    // u32
+#define BUS_WRITE_UPDATE_REPLY_LENGTH 3u
+#define BUS_UPDATE_REQUEST_LENGTH 3u
+#define BUS_UPDATE_REQUEST_ACTION 2u    // u8
+#define BUS_UPDATE_REPLY_LENGTH 3u
 
 // X(name, code, length of the request body, length of the reply body if the cause is ok, 1 if the
 // first field is an axis)
@@ -920,7 +993,11 @@ enum bus_operation {
     X(job_add, 53, 8, 3, 0) \
     X(job_save, 54, 2, 3, 0) \
     X(save_settings, 58, 3, 3, 0) \
-    X(saved_settings, 59, 2, 12, 0)
+    X(saved_settings, 59, 2, 12, 0) \
+    X(update_state, 60, 2, 15, 0) \
+    X(begin_update, 61, 19, 3, 0) \
+    X(write_update, 62, 36, 3, 0) \
+    X(update, 63, 3, 3, 0)
 
 enum bus_parameter {
     BUS_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period

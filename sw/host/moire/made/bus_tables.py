@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x51F95794
+PROTOCOL_CRC = 0x22F96A26
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -116,6 +116,15 @@ CAUSES = {
     71: ("saved_not_read",
          "the saved values were not read: the EEPROM did not answer at power-up, the defaults "
          "are in use"),
+    72: ("firmware_too_long", "the firmware is too long: the node has no room for it"),
+    73: ("firmware_of_other_node",
+         "this is firmware of another node: another register map, more memory, or too few axes"),
+    74: ("firmware_damaged",
+         "the firmware is damaged: its CRC-32 is wrong in the flash; send it again"),
+    75: ("firmware_on_trial",
+         "firmware is on trial: confirm it first, or switch the node off and on"),
+    76: ("drive_on", "a drive is on: switch all drives of the node off first"),
+    77: ("flash_failed", "the flash failed: it does not answer, or did not store the data"),
 }
 
 # bit: (name, words)
@@ -285,6 +294,24 @@ JOB_ACTIONS = {
 SAVE_ACTIONS = {
     0: ("save", "save all values that differ from their defaults, for the next power-up"),
     1: ("clear", "use the defaults from the next power-up on"),
+}
+
+# code: (name, words)
+UPDATE_ACTIONS = {
+    0: ("check",
+        "compare the new firmware in the flash with its CRC-32, and enter it in the flash"),
+    1: ("run", "start the new firmware on trial, 0.1 s after the reply"),
+    2: ("confirm", "keep the firmware that is on trial: it runs from the next power-up on"),
+}
+
+# code: (name, words)
+UPDATE_STATES = {
+    0: ("idle", "no update is in progress"),
+    1: ("erasing", "the flash is being erased"),
+    2: ("writing", "the new firmware is expected"),
+    3: ("checking", "the new firmware is being checked"),
+    4: ("checked", "the new firmware is complete: it can be started"),
+    5: ("starting", "the new firmware will be started"),
 }
 
 # bit: (name, words)
@@ -574,6 +601,30 @@ OPERATIONS = {operation.name: operation for operation in (
               (),
               (("writing", "u8"), ("cause", "u8"), ("damaged", "u8"),
                ("generation", "u32"), ("values", "u16"),)),
+    Operation("update_state", 60,
+              "progress of an update; cause: how its last step ended; image that runs: 0 the "
+              "factory image, 1 or 2 an updated one, with its CRC-32; trial 1: it is not "
+              "confirmed; longest: bytes for which there is room",
+              (),
+              (("state", "u8"), ("ended", "u8"), ("image", "u8"),
+               ("trial", "u8"), ("crc", "u32"), ("longest", "u32"),)),
+    Operation("begin_update", 61,
+              "erase the image that is not in use, for new firmware of so many bytes with this "
+              "CRC-32, made for this register map, memory and number of axes; refused while a "
+              "drive is on",
+              (("bytes", "u32"), ("crc", "u32"), ("map_crc", "u32"),
+               ("memory", "u32"), ("axes", "u8"),),
+              ()),
+    Operation("write_update", 62, "write block number `block` of the new firmware, 32 bytes",
+              (("block", "u16"), ("word_0", "u32"), ("word_1", "u32"),
+               ("word_2", "u32"), ("word_3", "u32"), ("word_4", "u32"),
+               ("word_5", "u32"), ("word_6", "u32"), ("word_7", "u32"),),
+              ()),
+    Operation("update", 63,
+              "check, start or confirm the new firmware (an update_action); update_state reports "
+              "the end; refused while a drive is on",
+              (("action", "u8"),),
+              ()),
 )}
 
 PARAMETERS = {parameter.name: parameter for parameter in (
