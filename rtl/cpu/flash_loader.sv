@@ -19,9 +19,10 @@
 `default_nettype none
 
 module flash_loader #(
-    parameter int WORDS = 4096,    // words to be copied, a power of two from 2 up
+    parameter int WORDS = 4096,  // words to be copied, a power of two from 2 up
     parameter int START = 131072,  // byte address of the first word in the flash
-    parameter int PAUSE = 64       // periods of 64 cycles until the flash is awake, 1 to WORDS - 1
+    parameter int PAUSE = 64,  // periods of 64 cycles until the flash is awake, 1 to WORDS - 1
+    parameter int HAS_PORT = 1  // 1: exchange bytes for the firmware; 0: send is ignored
 ) (
     input  wire                      clk,
     input  wire                      rst,
@@ -66,7 +67,7 @@ module flash_loader #(
     logic           releases;  // cs_n rises after this byte
 
     wire            last = half == 6'd63;
-    wire            rests = done && half == '0;  // until the next byte
+    wire            rests = HAS_PORT != 0 && done && half == '0;  // until the next byte
     wire    [ 31:0] received = {shifted[30:0], miso};
     wire    [ 31:0] read = {8'h03, 8'(START >> 16) + 8'(slot), 16'(START)};
 
@@ -101,7 +102,7 @@ module flash_loader #(
                 end
                 default: begin
                     if (&count) done <= 1'b1;
-                    if (&count || done) cs_n <= releases;
+                    if (&count || HAS_PORT != 0 && done) cs_n <= HAS_PORT == 0 || releases;
                 end
             endcase
         end

@@ -7,13 +7,13 @@
 // rate      An instruction takes 36 to 38 cycles, one with an access to memory, a jump, a branch, a
 //           comparison or a shift 70 to 104.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
-//           8000_0000 (64 KiB, whole words only), the port of the flash at 8001_0000, whole words
-//           as well. Any other access stops the core: trap is high until the next start. After rst
-//           flash_loader copies PROGRAM_BYTES from a serial flash into the memory, then the core
-//           starts at address 0. The memory has one port for reading and writing and no contents at
-//           power-up, so it may be a single-port RAM (SB_SPRAM256KA).
+//           8000_0000 (64 KiB, whole words only), with HAS_UPDATE the port of the flash at
+//           8001_0000, whole words as well. Any other access stops the core: trap is high until the
+//           next start. After rst flash_loader copies PROGRAM_BYTES from a serial flash into the
+//           memory, then the core starts at address 0. The memory has one port for reading and
+//           writing and no contents at power-up, so it may be a single-port RAM (SB_SPRAM256KA).
 //           An illegal instruction is not detected, and a misaligned access never ends.
-//           The port of the flash has two words; without HAS_UPDATE they read 0 and ignore writes.
+//           The port of the flash has two words.
 //           At 8001_0000, a write sends bits 7..0, and bit 8 ends the command; a read returns the
 //           byte of the flash in bits 7..0, and the image that was copied in bits 9..8.
 //           At 8001_0004, a write with bit 2 copies image 0 to 3 (bits 1..0) and starts the core
@@ -56,27 +56,27 @@ module serial_core #(
     // memory or port have answered; the registers will answer in the next cycle, have answered
     logic fetched, awaited, answered;
     logic restart, trial;
-    logic [1:0] slot;
+    logic [           1:0] slot;
     logic [TRIAL_BITS-1:0] trial_time;
-    wire [7:0] answer;
+    wire  [           7:0] answer;
 
-    wire valid = fetch || load_or_store;
-    wire [31:0] access = fetch ? fetch_address : data_address;
-    wire in_memory = access < 32'(MEMORY_BYTES);
-    wire in_registers = !fetch && data_address[31:16] == 16'h8000 && (&bytes || !storing);
-    wire in_port = !fetch && data_address[31:16] == 16'h8001 && (&bytes || !storing);
-    wire done = fetched || answered;
-    wire puts = load_or_store && storing && in_memory && !fetched;
-    wire orders = HAS_UPDATE != 0 && load_or_store && storing && in_port && !fetched;
-    wire sends = orders && !data_address[2];
-    wire controls = orders && data_address[2];
-    wire overdue = &trial_time;
-    wire reset = rst || restart;
-    wire [31:0] named = data_address[2] ? 32'(FLASH_START) : {22'd0, slot, answer};
-    wire [31:0] port_rdata = HAS_UPDATE != 0 ? named : '0;
-    wire [A-3:0] at = loaded ? access[A-1:2] : (A - 2)'(loaded_at);
+    wire                   valid = fetch || load_or_store;
+    wire  [          31:0] access = fetch ? fetch_address : data_address;
+    wire                   in_memory = access < 32'(MEMORY_BYTES);
+    wire                   whole = !fetch && (&bytes || !storing);  // a word, not a part of one
+    wire                   in_registers = whole && data_address[31:16] == 16'h8000;
+    wire                   in_port = HAS_UPDATE != 0 && whole && data_address[31:16] == 16'h8001;
+    wire                   done = fetched || answered;
+    wire                   puts = load_or_store && storing && in_memory && !fetched;
+    wire                   orders = load_or_store && storing && in_port && !fetched;
+    wire                   sends = orders && !data_address[2];
+    wire                   controls = orders && data_address[2];
+    wire                   overdue = &trial_time;
+    wire                   reset = rst || HAS_UPDATE != 0 && restart;
+    wire  [          31:0] port_rdata = data_address[2] ? 32'(FLASH_START) : {22'd0, slot, answer};
+    wire  [         A-3:0] at = loaded ? access[A-1:2] : (A - 2)'(loaded_at);
 
-    wire free = !(select || awaited || answered);
+    wire                   free = !(select || awaited || answered);
 
     assign write   = storing;
     assign address = data_address[15:0];
@@ -112,12 +112,13 @@ module serial_core #(
     end
 
     flash_loader #(
-        .WORDS(PROGRAM_BYTES / 4),
-        .START(FLASH_START)
+        .WORDS   (PROGRAM_BYTES / 4),
+        .START   (FLASH_START),
+        .HAS_PORT(HAS_UPDATE)
     ) u_loader (
         .clk,
         .rst    (reset),
-        .slot,
+        .slot   (HAS_UPDATE != 0 ? slot : 2'd0),
         // flash
         .cs_n   (flash_cs_n),
         .sclk   (flash_sclk),

@@ -77,7 +77,7 @@ def make_firmware(design: Design, folder: Path) -> str:
     machine = design.machine
     if not machine.image:
         return f"{machine.name} has no firmware"
-    chosen = machine.image, len(machine.axes), machine.core
+    chosen = machine.image, len(machine.axes), machine.core, machine.update
     try:
         return firmware.build(1024 * machine.memory_kib, folder, False, *chosen)
     except firmware.BuildError as why:

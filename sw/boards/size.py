@@ -45,7 +45,7 @@ class Size:
 
 def firmware_stem(machine: Machine) -> str:
     """The name of the files of the firmware's image."""
-    return stem_of(machine.image, len(machine.axes), machine.core)
+    return stem_of(machine.image, len(machine.axes), machine.core, machine.update)
 
 
 def axis_lut(axis: Axis) -> int:

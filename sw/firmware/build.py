@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Build the firmware: build/firmware/firmware.elf, .bin, .hex and .update; another image than
-`axis` and another number of axes have names of their own.
+"""Build the firmware: build/firmware/firmware.elf, .bin and .hex; another image than `axis`,
+another number of axes, and an image with updates over the bus have names of their own.
 
 An image is the firmware of one kind of node. It consists of the parts that its image_NAME.c lists;
 the linker drops what they do not reach. Its arrays have as many elements as the node has axes.
@@ -9,7 +9,8 @@ The compiler is zig (PyPI ziglang, of the running Python), or GNU with CROSS=ris
 in the environment.
 The .hex is for $readmemh: one 32-bit word per line, little endian in memory, filled with zeros up
 to the size of the memory.
-The .update is for `moire update`: one line of JSON that says for which nodes it is, then the .bin.
+With --update there is a .update for `moire update`: one line of JSON that says for which nodes it
+is, then the .bin.
 The .parts lists how many bytes each source takes. Nothing is built if nothing has changed. The exit
 code is 1, with one line of explanation, if a tool is missing, a source is wrong or the image does
 not fit: then the line says by how many bytes, and which parts are the largest.
@@ -207,23 +208,25 @@ def sources_of(name: str, folder: Path = HERE) -> list[Path]:
     return sources
 
 
-def defines_of(name: str, axes: int | None = None, core: str = "soft") -> list[str]:
-    """Macros of an image: it serves as many axes as it can, if no number is named. The firmware of
-    a serial core comes out of a flash.
+def defines_of(name: str, axes: int | None = None, update: bool = False) -> list[str]:
+    """Macros of an image: it serves as many axes as it can, if no number is named. With `update` it
+    can write new firmware into the flash of a serial core.
     """
     image = IMAGES[name]
     return [
         f"-DHARDWARE_AXES={axes or image.most_axes}u",
         f"-DHARDWARE_DRIVES={int(image.drives)}",
-        f"-DHARDWARE_FLASH={int(core == 'serial')}",
+        f"-DHARDWARE_UPDATE={int(update)}",
     ]
 
 
-def stem_of(name: str, axes: int, core: str = "soft") -> str:
-    """The name of the files of an image for nodes of so many axes with this soft core."""
+def stem_of(name: str, axes: int, core: str = "soft", update: bool = False) -> str:
+    """The name of the files of an image for nodes of so many axes with this soft core, with or
+    without updates over the bus.
+    """
     stem = "firmware" if name == "axis" else name
     stem += "" if axes == IMAGES[name].usual_axes else f"_{axes}_axes"
-    return stem + ("" if core == "soft" else f"_{core}")
+    return stem + ("" if core == "soft" else f"_{core}") + ("_update" if update else "")
 
 
 def flags_of(path: Path) -> list[str]:
@@ -276,21 +279,27 @@ def build(
     name: str = "axis",
     axes: int | None = None,
     core: str = "soft",
+    update: bool = False,
 ) -> str:
-    """Build an image for nodes of so many axes, or of as many as is usual, and report its size."""
+    """Build an image for nodes of so many axes, or of as many as is usual, with or without updates
+    over the bus, and report its size.
+    """
     image = IMAGES[name]
     axes = image.usual_axes if axes is None else axes
     if not 1 <= axes <= image.most_axes:
         raise BuildError(f"the image {name} serves 1 to {image.most_axes} axes, not {axes}")
     command, libraries = compiler(core)
-    command += defines_of(name, axes, core)
+    command += defines_of(name, axes, update)
     sources = [*sources_of(name), LINK, HERE / "build.py"]
-    stem = stem_of(name, axes, core)
-    elf, binary, text, update, parts, note = (
-        out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "update", "parts", "note")
+    stem = stem_of(name, axes, core, update)
+    elf, binary, text, parts, note = (
+        out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "parts", "note")
     )
+    results = [elf, binary, text, parts, note]
+    if update:
+        results.append(out / f"{stem}.update")
     state = fingerprint(sources, command, memory)
-    if not force and all(path.exists() for path in (elf, binary, text, update, parts, note)):
+    if not force and all(path.exists() for path in results):
         old_state, _, report = note.read_text().partition("\n")
         if old_state == state:
             return report.strip()
@@ -337,7 +346,8 @@ def build(
         )
     content, program = contents(segments, memory)
     binary.write_bytes(content[:program])
-    update.write_bytes(update_file(content[:program], name, axes, core, memory))
+    if update:
+        results[-1].write_bytes(update_file(content[:program], name, axes, core, memory))
     text.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
     parts.write_text("".join(f"{size:7} {source}\n" for source, size in sizes.items() if size))
     report = (
@@ -367,10 +377,13 @@ def main() -> None:
     parser.add_argument(
         "--out", type=Path, default=OUT, help="folder of the results (default build/firmware)"
     )
+    parser.add_argument(
+        "--update", action="store_true", help="with updates over the bus, for HAS_UPDATE of a node"
+    )
     parser.add_argument("--force", action="store_true", help="build even if nothing changed")
     options = parser.parse_args()
     try:
-        chosen = options.image, options.axes, options.core
+        chosen = options.image, options.axes, options.core, options.update
         print(build(options.memory, options.out, options.force, *chosen))
     except BuildError as error:
         sys.exit(f"firmware: {error}")

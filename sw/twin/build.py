@@ -580,9 +580,11 @@ def twin_library(
     return library
 
 
-def firmware(image: str = "axis", axes: int | None = None, core: str = "soft") -> list[int]:
+def firmware(
+    image: str = "axis", axes: int | None = None, core: str = "soft", update: bool = False
+) -> list[int]:
     """The words of an image of the firmware for nodes of so many axes, or of as many as is usual,
-    with this soft core, built first when it is not fresh.
+    with this soft core, with or without updates over the bus; built first when it is not fresh.
     """
     axes = firmware_build.IMAGES[image].usual_axes if axes is None else axes
     BUILD.mkdir(parents=True, exist_ok=True)
@@ -591,11 +593,11 @@ def firmware(image: str = "axis", axes: int | None = None, core: str = "soft") -
         run(
             [
                 *[sys.executable, "-m", "firmware.build", "--image", image, "--axes", axes],
-                *["--memory", MEMORY_BYTES, "--core", core],
+                *["--memory", MEMORY_BYTES, "--core", core, *(["--update"] if update else [])],
             ],
             "the firmware's build",
         )
-        stem = firmware_build.stem_of(image, axes, core)
+        stem = firmware_build.stem_of(image, axes, core, update)
         return words_of(ROOT / "build" / "firmware" / f"{stem}.hex")
 
 

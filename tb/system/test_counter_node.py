@@ -42,7 +42,7 @@ def node():
         baud=BAUD,
         seed=seed() % 1000,
         node_parameters=NODE,
-        firmware=build.firmware("counter", AXES, "serial"),
+        firmware=build.firmware("counter", AXES, "serial", update=True),
     ) as twin:
         twin.run(START_S)
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))

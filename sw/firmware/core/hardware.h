@@ -18,8 +18,8 @@
 #ifndef HARDWARE_DRIVES
 #define HARDWARE_DRIVES 1  // 0: the nodes of this image measure and have no drives
 #endif
-#ifndef HARDWARE_FLASH
-#define HARDWARE_FLASH 0  // 1: the firmware comes out of a flash and can reach it
+#ifndef HARDWARE_UPDATE
+#define HARDWARE_UPDATE 0  // 1: for nodes with HAS_UPDATE, whose firmware reaches its flash
 #endif
 
 // A position of 48 bits.

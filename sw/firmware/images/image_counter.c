@@ -7,7 +7,7 @@
 #include "update/update.h"
 
 const struct image_part image_parts[] = {
-#if HARDWARE_FLASH
+#if HARDWARE_UPDATE
     {update_start, update_work, update_operation, update_idle},
 #endif
     {scope_start, scope_work, scope_operation, scope_idle},

@@ -8,7 +8,7 @@
 #include "update/update.h"
 
 const struct image_part image_parts[] = {
-#if HARDWARE_FLASH
+#if HARDWARE_UPDATE
     {update_start, update_work, update_operation, update_idle},
 #endif
     {segments_start, segments_work, segments_operation, segments_idle},

@@ -107,12 +107,14 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 
 
 @cache
-def build(image: str, core: str = "soft") -> Path:
-    """Build the firmware of an image for a soft core as a shared library; returns its file."""
+def build(image: str, update: bool = False) -> Path:
+    """Build the firmware of an image, with or without updates over the bus, as a shared library;
+    returns its file.
+    """
     sources = [path for path in firmware_build.sources_of(image) if path.suffix == ".c"]
-    options = ["-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(image, core=core)]
-    name = image if core == "soft" else f"{image}_{core}"
-    return host_library_file(f"firmware_{name}", [*sources, BRIDGE], options)
+    options = ["-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(image, update=update)]
+    name = f"firmware_{image}" + ("_update" if update else "")
+    return host_library_file(name, [*sources, BRIDGE], options)
 
 
 @cache
@@ -121,11 +123,11 @@ def library(image: str = "axis") -> ctypes.CDLL:
     return load(build(image))
 
 
-def power_up(image: str, node: object, core: str = "soft") -> ctypes.CDLL:
+def power_up(image: str, node: object, update: bool = False) -> ctypes.CDLL:
     """A firmware with a memory of its own, as after power-up, until the node has gone. The loader
     loads a file only once, so that each firmware is a copy of the file.
     """
-    file = build(image, core)
+    file = build(image, update)
     with tempfile.TemporaryDirectory(dir=file.parent) as directory:
         loaded = load(Path(shutil.copy(file, directory)))
     weakref.finalize(node, _ctypes.dlclose, loaded._handle)

@@ -510,7 +510,7 @@ class CompiledNode:
             READ(self.read),
             WRITE(self.write),
         )  # kept alive as long as the firmware may call
-        self.firmware = power_up(image, self, "serial" if flash else "soft")
+        self.firmware = power_up(image, self, update=bool(flash))
         self.firmware.register_bridge(*self.answers)
         self.firmware.firmware_start()
 

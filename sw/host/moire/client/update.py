@@ -107,8 +107,8 @@ def read_firmware(file: str | Path) -> Firmware:
         good = False
     if not good:
         raise BadFile(
-            f"the file {file} is no firmware for an update: the firmware build makes one with the "
-            "end .update"
+            f"the file {file} is no firmware for an update: the firmware build makes one with "
+            "--update"
         )
     if len(program) != size or zlib.crc32(program) != crc:
         raise BadFile(

@@ -15,15 +15,15 @@ from moire.client.update import read_firmware, update, update_state
     "update",
     help="Write new firmware into a node whose firmware comes out of a flash, start it, and keep "
     "it once it answers. A power cut at any moment leaves the firmware before.",
-    example="moire --port /dev/ttyUSB0 --address 3 update counter_serial.update",
+    example="moire --port /dev/ttyUSB0 --address 3 update counter_serial_update.update",
 )
 @click.argument(
     "file",
     type=FILE,
     metavar="FILE",
     required=False,
-    help="Made by the firmware build, with the end .update. Without it the command says what the "
-    "node runs.",
+    help="Made by the firmware build with --update, with the end .update. Without it the command "
+    "says what the node runs.",
 )
 def update_firmware(call: Call, file: str | None) -> None:
     """All drives of the node must be off."""
