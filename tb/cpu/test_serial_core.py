@@ -7,8 +7,9 @@ tb/cpu/serial_core.py. Through the port of the flash it sends bytes and starts o
 import random
 
 import cocotb
+import pytest
 
-from tb.bench import ROOT, run, start
+from tb.bench import ROOT, needs, run, start
 from tb.cpu import core_program
 from tb.cpu.serial_core import results
 from tb.cpu.test_flash_loader import Flash
@@ -18,6 +19,7 @@ PROGRAM = 2048  # bytes that are copied
 START = 131072
 FLASH = ROOT / "build" / "serial_core" / "program.bin"
 TRAPS = range(1, 9)  # ORDER in serial_test.c
+PORT_ORDERS = (16, 17)  # that use the port of the flash
 BOOT = 64 * (64 + PROGRAM // 4 + 2)  # cycles until the core starts
 
 
@@ -95,7 +97,7 @@ async def latency_is_1_wait_cycle_for_memory_and_3_for_a_register(dut):
 
 @cocotb.test()
 async def every_wrong_access_traps_and_reset_starts_the_core_again(dut):
-    for order in TRAPS:
+    for order in (*TRAPS, *(() if int(dut.HAS_UPDATE.value) else PORT_ORDERS)):
         registers = await begin(dut)
         registers.words[8] = order
         await registers.until(lambda: str(dut.trap.value) == "1")
@@ -132,6 +134,7 @@ async def started(registers, slot):
 
 @cocotb.test()
 async def the_port_exchanges_a_byte_with_the_flash_and_names_image_and_start(dut):
+    needs(int(dut.HAS_UPDATE.value), "there is no port of the flash")
     registers = await begin(dut)
     for ends in (0, 1):
         registers.words[4], registers.words[8] = ends << 8 | 0xA5, 16
@@ -149,6 +152,7 @@ async def the_port_exchanges_a_byte_with_the_flash_and_names_image_and_start(dut
 
 @cocotb.test()
 async def another_image_starts_and_one_on_trial_is_replaced_by_image_0_in_time(dut):
+    needs(int(dut.HAS_UPDATE.value), "there is no choice of an image")
     registers = await begin(dut)
     registers.words[4], registers.words[8] = 0b1110, 17  # image 2, on trial
     await started(registers, 2)
@@ -164,8 +168,9 @@ async def another_image_starts_and_one_on_trial_is_replaced_by_image_0_in_time(d
     assert (int(dut.slot.value), int(dut.trial.value)) == (0, 0)
 
 
-def test_serial_core():
+@pytest.mark.parametrize("update", [0, 1])
+def test_serial_core(update):
     content = core_program.content("serial", BYTES, PROGRAM)
     FLASH.write_bytes(content)
     parameters = {"MEMORY_BYTES": BYTES, "PROGRAM_BYTES": PROGRAM, "FLASH_START": START}
-    run("serial_core", __file__, HAS_UPDATE=1, **parameters)
+    run("serial_core", __file__, HAS_UPDATE=update, **parameters)
