@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
+from boards import board
+from boards.family import Part
 from figures.common import Figure, console
 from figures.synthesis import (
     ECP5,
@@ -68,10 +70,6 @@ S0_NODE: Parameters = {
 }
 # a node that counts A/B/Z with index, filters and captures; its firmware is in the SPRAM
 COUNTER_BOX = Path(__file__).with_name("counter_box_bench.sv")
-# few clock enables of few flip-flops: they cost places in the rows of eight cells that share one
-# -abc9 knows the times of the part: 23.7 MHz instead of 18 to 20, with as many cells
-SPRAM = "-spram -dsp -dffe_min_ce_use 5 -abc9 -device u"
-FULL = ("--router", "router2")  # finds the ways through a part that is nearly full
 OF_BOTH: dict[str, Parameters] = {
     "compare": {"HAS_COMPARE": ALL_AXES},
     "capture queue": {"HAS_CAPTURE": ALL_AXES},
@@ -161,10 +159,21 @@ def node_ecp5_lut(place: bool = True, seed: int = 1) -> float:
 
 
 @cache
+def up5k() -> Part:
+    """The part of the iCEBreaker, with the options of synthesis and placement that fit a node."""
+    return board.named("icebreaker").part
+
+
+def counter_box() -> Path:
+    """The netlist of the node that counts."""
+    return netlist_of(COUNTER_BOX, {}, "ice40", 1, up5k().synthesis)
+
+
+@cache
 def on_up5k(seed: int) -> dict[str, float]:
     """{lc, fmax_mhz} of the node that counts, the worst of some placements."""
-    netlist = netlist_of(COUNTER_BOX, {}, "ice40", 1, SPRAM)
-    tries = placements(netlist, NEXTPNR_ICE40, UP5K, 20, seed, "--pcf-allow-unconstrained", *FULL)
+    options = ["--pcf-allow-unconstrained", *up5k().place]
+    tries = placements(counter_box(), NEXTPNR_ICE40, UP5K, 20, seed, *options)
     used = tries[0][1]
     names = ("ICESTORM_LC", "ICESTORM_RAM", "ICESTORM_SPRAM", "ICESTORM_DSP")
     words = ", ".join(f"{used[one]['used']} of {used[one]['available']} {one}" for one in names)

@@ -92,8 +92,8 @@ def builds() -> dict[str, Build]:
         ),
         "counter_box": Build(
             "node that counts, iCE40 UP5K",
-            lambda: netlist_of(area.COUNTER_BOX, {}, "ice40", 1, area.SPRAM),
-            *(NEXTPNR_ICE40, UP5K, 20.0, (*FREE, *area.FULL)),
+            area.counter_box,
+            *(NEXTPNR_ICE40, UP5K, 20.0, (*FREE, *area.up5k().place)),
         ),
         "s0_node": Build(
             "S0 node, LFE5U-25F-6", of_node(area.S0_NODE), NEXTPNR_ECP5, ECP5, 60.0, ALONE
