@@ -105,6 +105,8 @@ def test_the_command_judges_records_and_passes_the_seed_on(monkeypatch, tmp_path
         command.main(["fixed", "--seed", "2"])
     before = path.read_text()
     assert command.main(["small", "--seed", "2"]) == 1 and path.read_text() == before
+    path.unlink()
+    assert command.main(["fixed", "--unrecorded"]) == 0 and not path.exists()
 
 
 def needs_what_is_absent():
