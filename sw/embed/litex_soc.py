@@ -22,7 +22,7 @@ from litex.soc.interconnect import wishbone
 from embed import design
 from embed.litex_blocks import MAP_BYTES, MoireAxis, MoireNode
 from embed.litex_parts import NAME
-from twin.build import MEMORY_BYTES
+from firmware.build import MEMORY_BYTES
 
 CLK_HZ = 8_000_000
 AXIS_AT = 0x9000_0000

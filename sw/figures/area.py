@@ -27,6 +27,7 @@ from figures.synthesis import (
     placements,
     source_of,
 )
+from firmware import build as firmware_build
 from twin import build
 
 Parameters = Mapping[str, int | str]
@@ -61,7 +62,7 @@ SINE_AXES: Parameters = {
     "HAS_STEPPER": 0,
     "HAS_DAC": ALL_AXES,
     "HAS_FINE_STAGE": 0,
-    "MEMORY_BYTES": 98304,  # of the image `axis`
+    "MEMORY_BYTES": firmware_build.MEMORY_BYTES,  # of the image `axis`
 }
 S0_NODE: Parameters = {
     "CLK_HZ": 60_000_000,

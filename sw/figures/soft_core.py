@@ -31,7 +31,6 @@ from twin import build
 from twin.build import ROOT
 
 HERE = Path(__file__).resolve().parent
-MEMORY_BYTES = 98304
 SMALLER_BYTES = 65536
 PAGE = ROOT / "docs" / "soft_core.md"
 BEGIN, END = "<!-- sizes -->", "<!-- /sizes -->"
@@ -115,10 +114,10 @@ def program(core: Core, folder: Path) -> tuple[Path, int]:
         flags = [*tools.FLAGS, *tools.flags_of(path), *other, f"-I{tools.HERE}"]
         tools.run([*command, *flags, "-c", str(path), "-o", str(objects[-1])])
     script, elf, words = (folder / f"work.{end}" for end in ("ld", "elf", "hex"))
-    script.write_text(f"MEMORY_BYTES = {MEMORY_BYTES};\n" + tools.LINK.read_text())
+    script.write_text(f"MEMORY_BYTES = {tools.MEMORY_BYTES};\n" + tools.LINK.read_text())
     link = ["-Wl,--gc-sections", f"-Wl,-T,{script}", "-o", str(elf), *libraries]
     tools.run([*command, *tools.FLAGS, *map(str, objects), *link])
-    contents, used = tools.contents(tools.read_elf(elf)[0], MEMORY_BYTES)
+    contents, used = tools.contents(tools.read_elf(elf)[0], tools.MEMORY_BYTES)
     words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", contents)))
     return words, used
 
@@ -131,7 +130,7 @@ def simulated(core: Core, words: Path, folder: Path) -> Path:
         waiver.write_text('`verilator_config\nlint_off -file "*/VexRiscv.v"\n')
         more = [waiver, named_by_its_module(folder_of(core.package) / core.file, "VexRiscv")]
     tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
-    values = {"MEMORY_BYTES": MEMORY_BYTES, "FIRMWARE": f'"{words}"'}
+    values = {"MEMORY_BYTES": tools.MEMORY_BYTES, "FIRMWARE": f'"{words}"'}
     waivers = ROOT / "rtl" / "cpu" / "cores.vlt"
     build.verilate(folder, verilator, core.source, "Vtop", values, waivers, *more)
     headers = verilator / "include"
@@ -179,7 +178,7 @@ def area_of(core: Core) -> str:
         netlist = netlist_of(source, {}, "ecp5", 1)
     else:
         source = SOFT_CORE
-        netlist = netlist_of(source, {"MEMORY_BYTES": MEMORY_BYTES}, "ecp5", 1)
+        netlist = netlist_of(source, {"MEMORY_BYTES": tools.MEMORY_BYTES}, "ecp5", 1)
     clocks: list[str] = []
     used: dict[str, dict[str, int]] = {}
     for seed in SEEDS:
@@ -211,7 +210,7 @@ def size_row(image: str, axes: int, report: str) -> str:
     used = program + data + stack
     less = spaced(SMALLER_BYTES - used) if used <= SMALLER_BYTES else "–"
     cells = (f"`{image}`", IMAGES[image, axes], str(axes), *map(spaced, (program, data, stack)))
-    free = 100 * (1 - used / MEMORY_BYTES)
+    free = 100 * (1 - used / tools.MEMORY_BYTES)
     return "| " + " | ".join((*cells, f"{free:.1f} %", less)) + " |"
 
 
@@ -220,18 +219,18 @@ def sizes() -> None:
     heads = ("image", "node", "axes", "program", "data", "stack", "free of 96 KiB", "of 64 KiB")
     rows = ["", "| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
     for image, axes in IMAGES:
-        report = tools.build(MEMORY_BYTES, tools.OUT, False, image, axes)
+        report = tools.build(tools.MEMORY_BYTES, tools.OUT, False, image, axes)
         rows.append(size_row(image, axes, report))
     PAGE.write_text(made_files.filled(PAGE, BEGIN, END, [*rows, ""]), encoding="utf-8")
 
 
 def firmware_free_pct() -> float:
     """Of the memory of the S0 node: what program, data and stack leave."""
-    report = tools.build(MEMORY_BYTES, tools.OUT, False, "axis", 1)
+    report = tools.build(tools.MEMORY_BYTES, tools.OUT, False, "axis", 1)
     console.print(report, (tools.OUT / "firmware.parts").read_text())
     free = re.search(r"(\d+) free", report)
     assert free
-    return 100 * int(free[1]) / MEMORY_BYTES
+    return 100 * int(free[1]) / tools.MEMORY_BYTES
 
 
 FIGURES = {

@@ -39,6 +39,7 @@ from elftools.elf.sections import SymbolTableSection
 HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "build" / "firmware"
 LINK = HERE / "core" / "link.ld"
+MEMORY_BYTES = 98304  # of the soft core, as node.sv has it
 FLAGS = [
     "-std=c11",
     "-g",
@@ -372,7 +373,10 @@ def main() -> None:
         "--core", choices=sorted(CORES), default="soft", help="soft core (default soft)"
     )
     parser.add_argument(
-        "--memory", type=int, default=98304, help="bytes of the soft core's memory (default 98304)"
+        "--memory",
+        type=int,
+        default=MEMORY_BYTES,
+        help=f"bytes of the soft core's memory (default {MEMORY_BYTES})",
     )
     parser.add_argument(
         "--out", type=Path, default=OUT, help="folder of the results (default build/firmware)"

@@ -26,6 +26,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from firmware import build as firmware_build
+from firmware.build import MEMORY_BYTES
 from twin import crossings, netlist, registers, rising_edge, statements
 from twin.parameters import tables as parameters
 
@@ -38,7 +39,6 @@ TRAINING = "twin.nodes.training"
 DRIVER_HEADERS = [  # that drivers of simulations include by their path in sw
     HERE.parent / name for name in ("experiments/relay_pins.h", "figures/common.h")
 ]
-MEMORY_BYTES = 98304
 CORES = {"pythondata_cpu_picorv32": "verilog", "pythondata_cpu_serv": "verilog/rtl"}
 HIDDEN = "-fvisibility=hidden"
 VPI = ("verilated_cov", "verilated_dpi", "verilated_vpi")  # sources that cocotb needs as well

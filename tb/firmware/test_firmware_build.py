@@ -11,9 +11,9 @@ import pytest
 
 from figures import soft_core
 from firmware import build as firmware_build
-from twin.build import FIRMWARE
+from twin.build import FIRMWARE, ROOT
 
-MEMORY = 98304
+MEMORY = firmware_build.MEMORY_BYTES
 PAGE = soft_core.PAGE.read_text(encoding="utf-8")
 
 
@@ -47,6 +47,11 @@ def test_the_hex_is_the_program_filled_to_the_size_of_the_memory(made):
     assert b"".join(struct.pack("<I", int(line, 16)) for line in lines) == program + bytes(
         MEMORY - len(program)
     )
+
+
+def test_the_memory_is_that_of_a_node_by_default():
+    node = (ROOT / "rtl" / "node.sv").read_text(encoding="utf-8")
+    assert re.findall(r"parameter int MEMORY_BYTES = (\d+),", node) == [str(MEMORY)]
 
 
 def test_the_report_adds_up(made):

@@ -254,3 +254,13 @@ def test_the_command_plays_a_file_and_draws_it(file, tmp_path):
     dry = Call(["stream", file(*GOOD), "--dry", "--json"])
     assert json.loads(dry.out)["points"] == 3 and json.loads(dry.out)["duration_s"] == 0.08
     assert "line 1: it needs three columns" in sentence(Call(["stream", file("1, 2")]), 2)
+
+
+def test_the_command_refuses_before_it_switches_the_drive_on(file):
+    for image, reason in (
+        ("stream", "refused 'begin_stream': the axis has no zero"),
+        ("axis", "plays no streams"),
+    ):
+        node = BusNode(image=image)
+        assert reason in sentence(Call(["stream", file(*GOOD)], node), 1)
+        assert "enable" not in node.executed

@@ -3,6 +3,7 @@
 
 import pytest
 
+from firmware.build import MEMORY_BYTES
 from moire.client.bus import Bus
 from tb.bench import rtl_only
 from twin import Twin, TwinTransport
@@ -25,7 +26,7 @@ def test_registers_have_names_widths_and_words(twin):
     found = {one.name: (one.bits, one.words) for one in twin.registers()}
     assert found["now"] == (64, 1) and found["g_axis[0].u_axis.faults"] == (12, 1)
     assert found["u_rs485.watchdog_time"] == (16, 1) and found["drive_enable"] == (1, 1)
-    assert found["g_core.u_core.u_memory.memory"] == (32, 98304 // 4)
+    assert found["g_core.u_core.u_memory.memory"] == (32, MEMORY_BYTES // 4)
     assert found["u_motion.g_engine.u_engine.u_memory.words"] == (72, 128)
     assert 4000 < sum(bits for bits, words in found.values() if words == 1) < 12000
     assert not any("__Vdly" in name or "Trigger" in name for name in found)

@@ -99,8 +99,8 @@ class Axis(AxisParameters, AxisCapture):
         self.node.switched_on.add(self.number)
 
     def enable_for(self, motion: str) -> None:
-        """Switches the drive on for a "move" or "prepare". An axis without a zero is refused in the
-        words of the node, and its drive stays off.
+        """Switches the drive on for a "move", "prepare" or "begin_stream". An axis without a zero
+        is refused in the words of the node, and its drive stays off.
         """
         status = self.status()
         can_be_on = not status.faults and self.built().has("drive")  # else the node says why
@@ -218,12 +218,7 @@ class Axis(AxisParameters, AxisCapture):
         MotionFailed. Whatever interrupts the wait, Ctrl-C too, stops the axis under control.
         """
         path = streams.checked(points)
-        try:
-            self.request("stream")
-        except Refused as refused:
-            if refused.cause == "not_built":
-                raise with_more(refused, streams.REMEDY) from None
-            raise
+        self.require_streams()
         tick_hz = self.node.identity.tick_hz
         late_ticks = round(units.parse_time(late_limit) * tick_hz)
         if not 0 <= late_ticks <= STREAM_LATEST:
@@ -243,6 +238,15 @@ class Axis(AxisParameters, AxisCapture):
             return self.wait(progress)
 
         return self.stopping_on_error(carry_out)
+
+    def require_streams(self) -> None:
+        """Raises Refused, with what to do, if the firmware of the node plays no streams."""
+        try:
+            self.request("stream")
+        except Refused as refused:
+            if refused.cause == "not_built":
+                raise with_more(refused, streams.REMEDY) from None
+            raise
 
     def stream_limits(self) -> streams.Limits:
         """The limits that hold for a stream."""

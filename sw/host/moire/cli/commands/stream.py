@@ -61,7 +61,8 @@ def stream(
         return
     if take:
         call.axis.take_over()
-    run_motion(call, lambda axis, show: axis.stream(points, late_limit, show))
+    call.axis.require_streams()
+    run_motion(call, lambda axis, show: axis.stream(points, late_limit, show), "begin_stream")
 
 
 def draw(points: Sequence[Point]) -> bytes:
