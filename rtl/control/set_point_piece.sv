@@ -61,14 +61,14 @@ module set_point_piece (
     logic [2:0] division;  // 0, 1: of the acceleration; 2 to 4: of the jerk
     // 2^-40 period: distance beyond that at constant velocity; velocity change times ticks
     logic signed [63:0] more, changes;
-    logic negative;  // the dividend is below 0
+    logic        negative;  // the dividend is below 0
     logic [63:0] digits;  // bits of the dividend that are still to come, then of the quotient
-    logic [8:0] remainder;
+    logic [ 8:0] remainder;
     logic signed [49:0] played_acceleration, played_velocity;  // of the tick that is played
     logic signed [63:0] moved;  // 2^-40 period, since the piece began
 
     wire signed [72:0] gap = 73'($signed({position, 24'd0})) - 73'(begin_position);
-    wire               too_far = gap >= FARTHEST || gap <= -FARTHEST;
+    wire too_far = gap >= FARTHEST || gap <= -FARTHEST;
     wire signed [48:0] change = 49'(velocity) - 49'(begin_velocity);
 
     // numerators of acceleration and jerk
@@ -79,13 +79,13 @@ module set_point_piece (
     // division: ticks, ticks + 1, and for the jerk ticks - 1
     wire        [ 8:0] divisor = division == 3'd4 ? {1'b0, ticks} - 9'd1
         : {1'b0, ticks} + 9'(division == 3'd1 || division == 3'd3);
-    wire        [ 9:0] shifted = {remainder, digits[63]};
-    wire        [10:0] less = {1'b0, shifted} - {2'b00, divisor};
-    wire               fits = !less[10];
-    wire        [63:0] next_digits = {digits[62:0], fits};
+    wire [9:0] shifted = {remainder, digits[63]};
+    wire [10:0] less = {1'b0, shifted} - {2'b00, divisor};
+    wire fits = !less[10];
+    wire [63:0] next_digits = {digits[62:0], fits};
     wire signed [63:0] quotient = next_digits ^ {64{negative}};
-    wire               fits_48 = quotient[63:47] == {17{quotient[63]}};
-    wire               fits_32 = quotient[63:31] == {33{quotient[63]}};
+    wire fits_48 = quotient[63:47] == {17{quotient[63]}};
+    wire fits_32 = quotient[63:31] == {33{quotient[63]}};
 
     // a tick of the piece
     wire signed [49:0] next_velocity = played_velocity + played_acceleration;
