@@ -136,6 +136,14 @@ chromium: $(SETUP) ## Chromium by apt-get, and Playwright, which drives it in th
 		|| { echo "apt-get could not install chromium, see build/chromium.log: install it and run this again" >&2; false; }
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps -r tools/chromium.lock
 
+ngspice:          ## ngspice by apt-get, for `make spice`; docs/front_ends.md
+	@command -v ngspice > /dev/null || { mkdir -p build; $(AS_ROOT) apt-get -q update && $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
+		apt-get -qy install --no-install-recommends ngspice; } > build/ngspice.log 2>&1 < /dev/null \
+		|| { echo "apt-get could not install ngspice, see build/ngspice.log: install it and run this again" >&2; false; }
+
+spice: $(SETUP) ngspice   ## the 1 Vpp front end checked with ngspice; its numbers for the twin; docs/front_ends.md
+	@$(PYTHON) -m boards.spice
+
 AS_ROOT = $$([ "$$(id -u)" = 0 ] || echo sudo -n)
 
 gowin: $(GOWIN)   ## placement and bitstreams for Gowin parts into build/gowin, for `make board`; docs/boards.md
@@ -153,4 +161,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board litex gowin chromium clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board litex gowin chromium ngspice spice clean

@@ -35,6 +35,7 @@ PERIPHERAL_INPUTS = {  # at the levels at which nothing happens
     **dict.fromkeys(("edm_clock", "edm_data", "peer_rx", "sensor_rx"), "1'b1"),
     "edm_status": "2'b00",
 }
+FRONT_ENDS = "../../../docs/front_ends.md"  # from the folder of a wiring page
 ROW, HEAD, PARTS_LEFT, LETTER = 26, 30, 420, 8  # of the drawing, in its units
 
 
@@ -230,6 +231,7 @@ def page(design: Design) -> str:
         svg=Markup(svg(design)),
         connections=design.connections,
         unconnected=unconnected(design),
+        front_ends=FRONT_ENDS,
         level=level,
         bitstream=design.board.part.family.bitstream,
     )

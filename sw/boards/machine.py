@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from boards import front_ends
 from boards.toml_file import ROOT, Misfit, Table, read
 from firmware.build import IMAGES
 from moire.bus.protocol import MOST_AXES
@@ -112,6 +113,7 @@ class Between:
 
     part: str
     volts: list[float]  # levels on the side of the board: given to inputs, taken from outputs
+    front_end: str = ""  # of constraints/front_ends; empty: the part is enough
 
 
 @dataclass(frozen=True)
@@ -192,6 +194,21 @@ def axis_of(table: Table) -> Axis:
     return axis
 
 
+def check_front_end(table: Table, group: str, between: Between) -> None:
+    """Refuses a front end that is unknown, for other signals or for other levels."""
+    if between.front_end not in front_ends.names():
+        raise table.misfit(
+            f"there is no front end {between.front_end!r}; there are: "
+            f"{', '.join(front_ends.names())}"
+        )
+    found = front_ends.named(between.front_end)
+    if group not in found.groups:
+        raise table.misfit(f"the front end {found.name} is for {', '.join(found.groups)}")
+    if not set(between.volts) <= set(found.volts):
+        levels = " or ".join(f"{volts:g}" for volts in found.volts)
+        raise table.misfit(f"the front end {found.name} has {levels} V at the board")
+
+
 def between_of(table: Table) -> dict[str, Between]:
     found = {}
     for group in list(table.left):
@@ -202,8 +219,11 @@ def between_of(table: Table) -> dict[str, Between]:
         volts = levels if isinstance(levels, list) else [levels]
         if not volts or not all(isinstance(v, (int, float)) for v in volts):
             raise row.misfit("volts must be a number or a list of numbers")
-        found[group] = Between(row.take("part", str), [float(v) for v in volts])
+        part, front_end = row.take("part", str), row.take("front_end", str, "")
+        found[group] = Between(part, [float(v) for v in volts], front_end)
         row.close()
+        if front_end:
+            check_front_end(row, group, found[group])
     return found
 
 
