@@ -72,9 +72,10 @@ module set_point_piece (
     wire signed [48:0] change = 49'(velocity) - 49'(begin_velocity);
 
     // numerators of acceleration and jerk
-    wire signed [63:0] of_acceleration = 3 * more - changes + 2 * 64'(change);
-    wire signed [63:0] of_jerk = changes - 64'(change) - 2 * more;
-    wire signed [63:0] dividend = division == 3'd0 ? 2 * of_acceleration : 6 * of_jerk;
+    wire signed [63:0] of_acceleration = more + (more <<< 1) - changes + (64'(change) <<< 1);
+    wire signed [63:0] of_jerk = changes - 64'(change) - (more <<< 1);
+    wire signed [63:0] dividend = division == 3'd0 ? of_acceleration <<< 1
+        : (of_jerk <<< 2) + (of_jerk <<< 1);
 
     // division: ticks, ticks + 1, and for the jerk ticks - 1
     wire        [ 8:0] divisor = division == 3'd4 ? {1'b0, ticks} - 9'd1
