@@ -206,9 +206,15 @@ def result(front_end: FrontEnd, found: dict[str, list[list[float]]]) -> dict[str
     signal, converter = its.signal, its.converter
     full, lsb = converter["reference"], 2 * converter["reference"] / 2 ** converter["bits"]
     drawn = random.Random(its.seed + 1)  # the references of the converter are not in the netlist
-    reference = lambda: 1 + drawn.uniform(-1, 1) * converter["reference_pct"] / 100
+    spread = converter["reference_pct"] / 100
+    references = [
+        (1 + drawn.uniform(-spread, spread)) / (1 + drawn.uniform(-spread, spread))
+        for _ in range(its.boards)
+    ]
     sine, cosine = found["low"][0][:2]
-    gains = [row[1] / row[0] * reference() / reference() - 1 for row in found["low"][1:]]
+    gains = [
+        row[1] / row[0] * share - 1 for row, share in zip(found["low"][1:], references, strict=True)
+    ]
     delays = [(row[2] - row[3]) / (2 * math.pi * signal["highest_hz"]) for row in found["high"][1:]]
     amplitude = sine * signal["nominal_vpp"] / 2
     # of full scale at its SNR, less the noise of the quantisation, which the twin makes itself

@@ -553,13 +553,13 @@ def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
         ),
         ('X.step = "J1 gn3"', 'X.stepp = "J1 gn3"', "X.stepp is no signal of this machine"),
         (  # a 5 V signal on a 3.3 V pin
-            'part = "RS-422 receiver, AM26LV32 at 3.3 V"\nvolts = 3.3',
+            'part = "RS-422 receiver, AM26LV32 at 3.3 V"\nfront_end = "rs422"\nvolts = 3.3',
             'part = "RS-422 receiver, AM26LS32"\nvolts = 5.0',
             f"X.encoder_a comes with 5 V, but J1 gp0 of {ULX3S} takes 3.3 V at most",
         ),
         (
-            '[between.rs485]\npart = "RS-485 transceiver, MAX3485"\nvolts = 3.3',
-            '[between.rs485]\npart = "MAX485"\nvolts = [5.0]',
+            'part = "RS-485 transceiver, MAX3485"\nfront_end = "rs485"\nvolts = 3.3',
+            'part = "MAX485"\nvolts = [5.0]',
             f"rs485_rx comes with 5 V, but J2 gp21 of {ULX3S} takes 3.3 V at most",
         ),
         (
@@ -588,7 +588,11 @@ def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
             "[axis 2] features: 'lasers' is none of sine, ",
         ),
         ("[between.estop]", "[between.stop]", "[between] stop is none of adc, bridge, "),
-        ("[between.rs485]", "[between.adc]", "rs485_rx needs [between.rs485]: part and volts"),
+        (
+            '[between.rs485]\npart = "RS-485 transceiver, MAX3485"\nfront_end = "rs485"',
+            '[between.adc]\npart = "RS-485 transceiver, MAX3485"',
+            "rs485_rx needs [between.rs485]: part and volts",
+        ),
     ],
 )
 def test_a_wrong_machine_file_is_refused_with_its_name(old, new, words, tmp_path):
