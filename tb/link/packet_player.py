@@ -31,6 +31,10 @@ class PacketPlayer:
         sent = int(self.byte is not None)
         return self.busy, access.select, *held, sent, self.byte, self.last
 
+    def stored(self, place):
+        """A word of the request that is played."""
+        return self.requests[self.bank, place]
+
     def reach(self, put, at, value):
         """An access of the register bus; returns the word read, or written."""
         self.taking = {"put": put, "at": at, "value": value}
@@ -56,14 +60,13 @@ class PacketPlayer:
             inputs = yield
             if not inputs["start"]:
                 continue
-            self.busy, request = 1, inputs["bank"]
-            stored = lambda n: self.requests[request, n]
+            self.busy, self.bank = 1, inputs["bank"]
             writes, reads = inputs["writes"], inputs["reads"]
             for n in range(writes):
                 yield
                 yield
                 at = self.lists[n] & 0xFFFF
-                yield from self.reach(1, at, stored(layout.REQUEST_WORDS + n))
+                yield from self.reach(1, at, self.stored(layout.REQUEST_WORDS + n))
             yield
             words = []
             for n in range(layout.REPLY_WORDS):
@@ -73,7 +76,7 @@ class PacketPlayer:
                 words.append(
                     {
                         layout.REPLY_IDENTITY: layout.KIND_REPLY | inputs["session"] << 8,
-                        layout.REPLY_SEQUENCE: stored(layout.REQUEST_SEQUENCE),
+                        layout.REPLY_SEQUENCE: self.stored(layout.REQUEST_SEQUENCE),
                         layout.REPLY_TIME: inputs["now"],
                         layout.REPLY_REFUSED: counts & 0xFFFFFFFF,
                         layout.REPLY_STATE: counts >> 32,
@@ -87,7 +90,7 @@ class PacketPlayer:
             yield
             yield
             yield
-            spare, value = (stored(layout.REQUEST_WORDS + writes + n) for n in (0, 1))
+            spare, value = (self.stored(layout.REQUEST_WORDS + writes + n) for n in (0, 1))
             words.append((yield from self.reach(spare >> 31, spare & 0xFFFF, value)))
             yield
             content = b"".join(word.to_bytes(4, "little") for word in words)

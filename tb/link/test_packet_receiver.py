@@ -23,7 +23,7 @@ class Receiver:
     def __init__(self, dut):
         self.dut, self.model, self.cycles = dut, PacketReceiver(), 0
         self.settings = {"enable": 1, "session": SESSION, "writes": 2, "time_window": 0}
-        self.now = self.busy = 0
+        self.now = self.busy = self.put = 0
 
     async def clk(self, valid=0, data=0, ends=0, broken=0, rst=0):
         """One cycle; returns accepted."""
@@ -37,6 +37,7 @@ class Receiver:
             if level is not None:
                 got = int(getattr(self.dut, name).value)
                 assert got == level, f"cycle {self.cycles}: {name} is {got:#x}, not {level:#x}"
+        self.put = int(self.dut.put.value)
         self.model.step(**inputs)
         self.cycles += 1
         await RisingEdge(self.dut.clk)
@@ -100,10 +101,11 @@ async def a_request_is_accepted_once_and_each_cause_is_counted_alone(dut):
 
 
 @cocotb.test()
-async def latency_is_1_from_ends_to_accepted(dut):
+async def latency_is_1_from_ends_to_accepted_and_0_from_each_fourth_byte_to_put(dut):
     receiver = await begin(dut)
-    for byte in link().request(0, [1, 2]):
+    for n, byte in enumerate(link().request(0, [1, 2])):
         assert not await receiver.clk(1, byte)
+        assert receiver.put == (n % 4 == 3)
     assert not await receiver.clk(ends=1)
     assert await receiver.clk()
 
