@@ -23,6 +23,7 @@ BLOCKS = {  # of each directory: the family, the block, the arguments of its tes
     "registers": ("ice40", "register_layout", {"axes": 1, "masks": {}}),
     "relay": ("ecp5", "relay_status", {}),
     "sense": ("ice40", "encoder_events", {}),
+    "link": ("ecp5", "packet_receiver", {}),
     "serial": ("ecp5", "half_duplex", {}),
 }
 

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""process_link: requests of the host's codec in, accesses and replies out, with a request arriving
+while the last one is answered, and the watchdog. Its blocks' models run beside it in every cycle.
+"""
+
+import random
+
+import cocotb
+from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
+
+from moire.bus.link import Link, Spare
+from tb.bench import run, start
+from tb.interlock.heartbeat_watchdog import HeartbeatWatchdog
+from tb.link.packet_player import PacketPlayer
+from tb.link.packet_receiver import PacketReceiver
+
+SESSION = 0x00BEEF
+CLK_HZ = 1_000_000
+NAMES = ("busy", "select", "write", "address", "wdata", "tx_valid", "tx_data", "tx_last")
+INPUTS = {
+    "enable": 0,
+    "session": SESSION,
+    "writes": 2,
+    "reads": 2,
+    "time_window": 1000,
+    "watchdog_ms": 2,
+    "list_put": 0,
+    "list_at": 0,
+    "list_entry": 0,
+    "rx_valid": 0,
+    "rx_data": 0,
+    "rx_ends": 0,
+    "rx_broken": 0,
+    "tx_taken": 1,
+    "ready": 1,
+    "rdata": 0,
+    "now": 0,
+}
+LIST = (0x410_0400, 0x414_0404)  # reads 410 and 414, writes 400 and 404
+
+
+class Node:
+    """The design with the models of its blocks beside it, and registers behind it."""
+
+    def __init__(self, dut):
+        self.dut, self.levels, self.cycles = dut, dict(INPUTS), 0
+        self.receiver, self.player = PacketReceiver(), PacketPlayer()
+        self.watchdog, self.expired = HeartbeatWatchdog(CLK_HZ), 0
+        self.registers, self.answers, self.replies = {}, [0, 0], [bytearray()]
+
+    async def clk(self, rst=0, **strobes):
+        now = self.levels["now"] = (self.levels["now"] + 1) % 2**32
+        inputs = self.levels | strobes | {"rst": rst, "rdata": self.answers.pop(0)}
+        for name, level in inputs.items():
+            getattr(self.dut, name).value = level
+        await ReadOnly()
+        enable, session, writes = (inputs[name] for name in ("enable", "session", "writes"))
+        traffic = {"enable": enable, "valid": inputs["rx_valid"], "data": inputs["rx_data"]}
+        accepted, bank, refused, put, put_at, word = self.receiver.outputs(**traffic)
+        want = dict(zip(NAMES, self.player.outputs(), strict=True))
+        for name, level in (want | {"refused": refused, "expired": self.expired}).items():
+            if level is not None and self.cycles:
+                got = int(getattr(self.dut, name).value)
+                assert got == level, f"cycle {self.cycles}: {name} is {got:#x}, not {level:#x}"
+        self.cycles += 1
+        answer = self.answers[-1]
+        if want["select"]:
+            if want["write"]:
+                self.registers[want["address"]] = want["wdata"]
+            answer = self.registers.get(want["address"], want["address"] + 1)
+        self.answers.append(answer)
+        if want["tx_valid"] and inputs["tx_taken"]:
+            self.replies[-1].append(want["tx_data"])
+            if want["tx_last"]:
+                self.replies.append(bytearray())
+        self.receiver.step(
+            **traffic,
+            session=session,
+            writes=writes,
+            time_window=inputs["time_window"],
+            now=now,
+            ends=inputs["rx_ends"],
+            broken=inputs["rx_broken"],
+            busy=want["busy"],
+            rst=rst,
+        )
+        self.player.step(
+            **{name: inputs[name] for name in ("list_put", "list_at", "list_entry", "ready")},
+            **{name: inputs[name] for name in ("reads", "rdata", "enable", "session", "writes")},
+            taken=inputs["tx_taken"],
+            put=put,
+            put_at=put_at,
+            word=word,
+            bank=bank,
+            start=accepted,
+            refused=refused,
+            expired=self.expired,
+            now=now,
+            rst=rst,
+        )
+        self.expired = self.watchdog.clk(rst, inputs["watchdog_ms"], accepted, enable)
+        await RisingEdge(self.dut.clk)
+        await FallingEdge(self.dut.clk)
+
+    async def send(self, packet):
+        for byte in packet:
+            await self.clk(rx_valid=1, rx_data=byte)
+        await self.clk(rx_ends=1)
+        await self.clk()
+
+    async def answered(self):
+        """Run until the reply is complete; returns it."""
+        assert self.player.busy or self.receiver.verdict == "accepted"
+        while len(self.replies) < 2:
+            await self.clk()
+        await self.clk()
+        return bytes(self.replies.pop(0))
+
+
+async def begin(dut):
+    await start(dut, **INPUTS)
+    await FallingEdge(dut.clk)
+    node = Node(dut)
+    await node.clk(rst=1)
+    for n, entry in enumerate(LIST):
+        await node.clk(list_put=1, list_at=n, list_entry=entry)
+    node.levels["enable"] = 1
+    return node, Link(SESSION, 2, 2)
+
+
+@cocotb.test()
+async def a_request_is_played_and_answered_and_a_repeated_one_is_not(dut):
+    node, host = await begin(dut)
+    packet = host.request(node.levels["now"] + 40, [11, 22], Spare(0x500, 33))
+    await node.send(packet)
+    reply = host.reply(await node.answered())
+    assert node.registers == {0x400: 11, 0x404: 22, 0x500: 33}
+    assert reply and reply.values == (0x411, 0x415) and reply.spare == 33
+    node.registers.clear()
+    await node.send(packet)
+    for _ in range(50):
+        await node.clk()
+    assert not node.registers and len(node.replies) == 1
+    await node.send(host.request(node.levels["now"], [1, 2]))
+    assert host.reply(await node.answered()).refused["replayed"] == 1
+
+
+@cocotb.test()
+async def a_request_that_arrives_during_an_answer_is_busy_and_changes_nothing(dut):
+    node, host = await begin(dut)
+    await node.send(host.request(node.levels["now"], [11, 22]))
+    node.levels["tx_taken"] = 0
+    second = Link(SESSION, 2, 2)
+    second.sequence = host.sequence
+    await node.send(second.request(node.levels["now"], [0xBAD, 0xBAD]))
+    node.levels["tx_taken"] = 1
+    assert host.reply(await node.answered()).values == (0x411, 0x415)
+    assert node.registers == {0x400: 11, 0x404: 22}
+    assert node.receiver.counts["busy"] == 1
+
+
+@cocotb.test()
+async def the_watchdog_expires_after_its_time_and_a_bad_packet_does_not_kick_it(dut):
+    node, host = await begin(dut)
+    await node.send(host.request(node.levels["now"], [1, 2]))
+    await node.answered()
+    for _ in range(1000):
+        await node.clk()
+    await node.send(bytes(range(32)))
+    for _ in range(1000):
+        await node.clk()
+    assert node.expired
+    await node.send(host.request(node.levels["now"], [1, 2]))
+    assert not node.expired
+    await node.answered()
+
+
+@cocotb.test()
+async def any_bytes_match_the_models(dut):
+    node, host = await begin(dut)
+    for _ in range(40):
+        packet = bytearray(host.request(node.levels["now"], [random.getrandbits(32)] * 2))
+        if random.getrandbits(1):
+            packet[random.randrange(len(packet))] ^= random.getrandbits(8)
+        await node.send(packet)
+        for _ in range(random.choice([0, 0, 150])):
+            await node.clk(tx_taken=random.getrandbits(1))
+        if random.random() < 0.05:
+            await node.clk(rst=1)
+
+
+def test_process_link():
+    run("process_link", __file__, CLK_HZ=CLK_HZ)
