@@ -21,7 +21,8 @@
 // limits    ticks is 2 to 255. The inputs stay as they are until valid. begin_velocity and velocity
 //           are in the range of 2^47 units.
 // source    forward differences of a cubic, as in docs/stream.md
-// model     tb/control/set_point_piece.py, equal in every bit of every cycle
+// model     tb/control/set_point_piece.py: busy and valid are equal in every cycle, refused and the
+//           piece in every bit in the cycle of valid
 `default_nettype none
 
 module set_point_piece (
