@@ -25,7 +25,6 @@ module packet_player (
     input  wire         rst,
     // settings
     input  wire         enable,      // level: the link is on
-    input  wire  [23:0] session,     // number of the session
     input  wire  [ 6:0] writes,      // entries of the write list
     input  wire  [ 6:0] reads,       // entries of the read list
     input  wire         list_put,    // strobe: list_entry is stored
@@ -88,7 +87,6 @@ module packet_player (
     logic   [ 7:0] index;  // of the entry or the word
     logic   [15:0] at;  // address of the register
     logic          writing;
-    logic   [31:0] shifted;  // bytes to be sent, the next one lowest
     logic   [ 1:0] number;  // of the byte
     logic [31:0] fetched, reply_word;  // what the memories have read
     logic free, waits, done;
@@ -107,7 +105,8 @@ module packet_player (
         endcase
     end
 
-    // memory of the requests and the lists: banks 0 and 1, then the lists
+    // Memory of the requests and the lists: banks 0 and 1, then the lists. No word of it, and none of
+    // the reply, is used that is written in the cycle in which it is read: no_rw_check.
     wire         in_list = phase == WRITES || phase == READS;
     wire         from_list = state == FETCH && in_list;
     wire  [ 6:0] spare_at = writes + 7'(REQUEST_WORDS) + {6'd0, state == VALUE};
@@ -115,7 +114,7 @@ module packet_player (
     wire  [ 8:0] request_at = {1'b0, !bank, phase == SPARE ? spare_at : value_at};
     wire  [ 8:0] fetch_at = from_list ? {2'b10, index[6:0]} : request_at;
     wire         list_stored = list_put && !enable && !busy;
-    logic [31:0] requests                                                           [0:511];
+    (* no_rw_check *)logic [31:0] requests                                                           [0:511];
     always_ff @(posedge clk) begin
         if (put || list_stored)
             requests[list_stored?{2'b10, list_at} : {1'b0, bank, put_at}] <=
@@ -125,12 +124,13 @@ module packet_player (
 
     // memory of the reply
     wire  [ 2:0] head_at = index[2:0];
+    wire  [31:0] reply_identity = {fetched[31:8], KIND_REPLY};  // the session is the link's
     wire  [31:0] refused_low = refused[31:0];
     wire  [31:0] link_state = {15'd0, expired, refused[47:32]};
     logic [31:0] head;
     always_comb begin
         case (head_at)
-            3'(REPLY_IDENTITY): head = {session, KIND_REPLY};
+            3'(REPLY_IDENTITY): head = reply_identity;
             3'(REPLY_SEQUENCE): head = fetched;
             3'(REPLY_TIME):     head = now;
             3'(REPLY_REFUSED):  head = refused_low;
@@ -142,9 +142,9 @@ module packet_player (
     wire  [ 6:0] past_head = heads ? 7'd0 : 7'(REPLY_WORDS);
     wire  [ 6:0] past_reads = phase == SPARE ? reads : 7'd0;
     wire  [ 6:0] reply_at = index[6:0] + past_head + past_reads;
-    logic [31:0] replies                                                           [0:127];
+    (* no_rw_check *)logic [31:0] replies                                                           [0:127];
     always_ff @(posedge clk) begin
-        if (reply_put) replies[reply_at] <= heads ? head : write ? wdata : rdata;
+        if (reply_put) replies[reply_at] <= heads ? head : rdata;
         reply_word <= replies[index[6:0]];
     end
 
@@ -176,12 +176,13 @@ module packet_player (
         .crc
     );
 
-    wire ends = index == words;
-    wire sent = valid && taken && number == 2'd3;
+    wire [31:0] sent_word = phase == SEAL ? crc : reply_word;
+    wire        ends = index == words;
+    wire        sent = valid && taken && number == 2'd3;
 
     assign busy  = state != IDLE;
     assign valid = state == BYTES;
-    assign data  = shifted[7:0];
+    assign data  = sent_word[8*number+:8];
     assign last  = valid && phase == SEAL && number == 2'd3;
 
     always_ff @(posedge clk) begin
@@ -200,7 +201,6 @@ module packet_player (
             VALUE: begin
                 at      <= phase == READS ? fetched[31:16] : fetched[15:0];
                 writing <= phase == WRITES || (phase == SPARE && fetched[31]);
-                shifted <= phase == SEAL ? crc : reply_word;
                 number  <= '0;
                 if (phase == HEAD) index <= index + 8'd1;
                 state <= phase == HEAD ? FETCH : phase == SEND || phase == SEAL ? BYTES : TAKE;
@@ -213,7 +213,6 @@ module packet_player (
             end
             BYTES:
             if (taken) begin
-                shifted <= {8'd0, shifted[31:8]};
                 number  <= number + 2'd1;
                 if (sent) begin
                     index <= index + 8'd1;
@@ -247,6 +246,7 @@ module packet_player (
             if (phase == READS && select) assert (!write);
             if (state == TAKE) assert (writing == (phase == WRITES) || phase == SPARE);
             if (state == ANSWER) assert (write == (phase == WRITES) || phase == SPARE);
+            if (state == BYTES) assert (reply_word == replies[index[6:0]]);
             if ($past(valid && !taken)) assert (valid && $stable(data) && $stable(last));
             if (last) assert (valid && phase == SEAL);
             cover (select && write);

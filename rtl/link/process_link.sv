@@ -81,7 +81,6 @@ module process_link #(
         .rst,
         // settings
         .enable,
-        .session,
         .writes,
         .reads,
         .list_put,

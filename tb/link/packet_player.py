@@ -36,13 +36,13 @@ class PacketPlayer:
         return self.requests[self.bank, place]
 
     def reach(self, put, at, value):
-        """An access of the register bus; returns the word read, or written."""
+        """An access of the register bus; returns the word that the bus has then."""
         self.taking = {"put": put, "at": at, "value": value}
         yield
         while True:
             inputs = yield
             if inputs["done"]:
-                return self.access.wdata if put else inputs["rdata"]
+                return inputs["rdata"]
 
     def send(self, content):
         """The bytes of a word."""
@@ -75,7 +75,8 @@ class PacketPlayer:
                 counts = inputs["refused"] | inputs["expired"] << 48
                 words.append(
                     {
-                        layout.REPLY_IDENTITY: layout.KIND_REPLY | inputs["session"] << 8,
+                        layout.REPLY_IDENTITY: (self.stored(layout.REQUEST_IDENTITY) & ~0xFF)
+                        | layout.KIND_REPLY,
                         layout.REPLY_SEQUENCE: self.stored(layout.REQUEST_SEQUENCE),
                         layout.REPLY_TIME: inputs["now"],
                         layout.REPLY_REFUSED: counts & 0xFFFFFFFF,

@@ -25,7 +25,6 @@ class Player:
     def __init__(self, dut):
         self.dut, self.model, self.cycles = dut, PacketPlayer(), 0
         self.levels = dict.fromkeys((*STROBES, *REST, "bank", "writes", "reads", "enable"), 0)
-        self.levels |= {"session": SESSION}
         self.registers, self.accesses, self.reply = {}, [], bytearray()
         self.answers, self.word = [None, None], 0
         self.stall = 0.0  # share of cycles without ready, and without taken
@@ -117,9 +116,8 @@ async def the_registers_are_written_then_read_in_order_then_the_spare_one(dut):
     assert got and (got.sequence, got.time, got.expired) == (1, 77, True)
     assert got.values == (0x410 * 3, 0xC04 * 3) and got.spare == 0x300
     assert list(got.refused.values()) == [1, 2, 3, 4, 5, 6]
-    reply, accesses = await player.play(host.request(0, [7, 8, 9], Spare(0x104, 0xFFFFFFFF)))
+    _, accesses = await player.play(host.request(0, [7, 8, 9], Spare(0x104, 0xFFFFFFFF)))
     assert accesses[-1] == (0x104, 0xFFFFFFFF)
-    assert host.reply(reply).spare == 0xFFFFFFFF
 
 
 @cocotb.test()

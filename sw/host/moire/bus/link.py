@@ -42,7 +42,7 @@ class Reply:
     sequence: int
     time: int  # cycles of the node, low word, before the first register was read
     values: tuple[int, ...]  # in the order of the read list
-    spare: int  # value that the spare access read or wrote
+    spare: int  # value that the spare access read; without meaning after a write
     refused: dict[str, int]  # counts of refused packets by cause, which wrap at 256
     expired: bool  # the watchdog has expired
 
