@@ -105,8 +105,8 @@ module packet_player (
         endcase
     end
 
-    // Memory of the requests and the lists: banks 0 and 1, then the lists. No word of it, and none of
-    // the reply, is used that is written in the cycle in which it is read: no_rw_check.
+    // Memory of the requests and the lists: banks 0 and 1, then the lists. No word that is used, here
+    // or of the reply, is read in the cycle in which it is written: no_rw_check.
     wire         in_list = phase == WRITES || phase == READS;
     wire         from_list = state == FETCH && in_list;
     wire  [ 6:0] spare_at = writes + 7'(REQUEST_WORDS) + {6'd0, state == VALUE};
@@ -114,7 +114,9 @@ module packet_player (
     wire  [ 8:0] request_at = {1'b0, !bank, phase == SPARE ? spare_at : value_at};
     wire  [ 8:0] fetch_at = from_list ? {2'b10, index[6:0]} : request_at;
     wire         list_stored = list_put && !enable && !busy;
+
     (* no_rw_check *)logic [31:0] requests                                                           [0:511];
+
     always_ff @(posedge clk) begin
         if (put || list_stored)
             requests[list_stored?{2'b10, list_at} : {1'b0, bank, put_at}] <=
@@ -142,7 +144,9 @@ module packet_player (
     wire  [ 6:0] past_head = heads ? 7'd0 : 7'(REPLY_WORDS);
     wire  [ 6:0] past_reads = phase == SPARE ? reads : 7'd0;
     wire  [ 6:0] reply_at = index[6:0] + past_head + past_reads;
+
     (* no_rw_check *)logic [31:0] replies                                                           [0:127];
+
     always_ff @(posedge clk) begin
         if (reply_put) replies[reply_at] <= heads ? head : rdata;
         reply_word <= replies[index[6:0]];
