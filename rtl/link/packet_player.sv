@@ -65,6 +65,11 @@ module packet_player (
     localparam int REPLY_END_WORDS = 1;
     // end of the made constants
 
+    // Requests: banks 0 and 1, then the lists. No word of the memories that is used is read in the
+    // cycle in which it is written.
+    (* no_rw_check *)logic [31:0] requests[0:511];
+    (* no_rw_check *)logic [31:0] replies [0:127];
+
     typedef enum logic [2:0] {
         IDLE,
         FETCH,   // the memory reads an entry of a list, or a word
@@ -105,18 +110,14 @@ module packet_player (
         endcase
     end
 
-    // Memory of the requests and the lists: banks 0 and 1, then the lists. No word of it, and none
-    // of the reply, is used that is written in the cycle in which it is read: no_rw_check.
-    wire         in_list = phase == WRITES || phase == READS;
-    wire         from_list = state == FETCH && in_list;
-    wire  [ 6:0] spare_at = writes + 7'(REQUEST_WORDS) + {6'd0, state == VALUE};
-    wire  [ 6:0] value_at = index[6:0] + (phase == HEAD ? 7'd0 : 7'(REQUEST_WORDS));
-    wire  [ 8:0] request_at = {1'b0, !bank, phase == SPARE ? spare_at : value_at};
-    wire  [ 8:0] fetch_at = from_list ? {2'b10, index[6:0]} : request_at;
-    wire         list_stored = list_put && !enable && !busy;
-
-    (* no_rw_check *)
-    logic [31:0] requests                                                           [0:511];
+    // place in the memory of the requests
+    wire       in_list = phase == WRITES || phase == READS;
+    wire       from_list = state == FETCH && in_list;
+    wire [6:0] spare_at = writes + 7'(REQUEST_WORDS) + {6'd0, state == VALUE};
+    wire [6:0] value_at = index[6:0] + (phase == HEAD ? 7'd0 : 7'(REQUEST_WORDS));
+    wire [8:0] request_at = {1'b0, !bank, phase == SPARE ? spare_at : value_at};
+    wire [8:0] fetch_at = from_list ? {2'b10, index[6:0]} : request_at;
+    wire       list_stored = list_put && !enable && !busy;
 
     always_ff @(posedge clk) begin
         if (put || list_stored)
@@ -140,14 +141,11 @@ module packet_player (
             default:            head = link_state;
         endcase
     end
-    wire         heads = state == VALUE && phase == HEAD;
-    wire         reply_put = heads || (state == ANSWER && done && phase != WRITES);
-    wire  [ 6:0] past_head = heads ? 7'd0 : 7'(REPLY_WORDS);
-    wire  [ 6:0] past_reads = phase == SPARE ? reads : 7'd0;
-    wire  [ 6:0] reply_at = index[6:0] + past_head + past_reads;
-
-    (* no_rw_check *)
-    logic [31:0] replies                                                           [0:127];
+    wire       heads = state == VALUE && phase == HEAD;
+    wire       reply_put = heads || (state == ANSWER && done && phase != WRITES);
+    wire [6:0] past_head = heads ? 7'd0 : 7'(REPLY_WORDS);
+    wire [6:0] past_reads = phase == SPARE ? reads : 7'd0;
+    wire [6:0] reply_at = index[6:0] + past_head + past_reads;
 
     always_ff @(posedge clk) begin
         if (reply_put) replies[reply_at] <= heads ? head : rdata;
