@@ -144,9 +144,14 @@ def names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
+def unknown(name: str) -> str:
+    """Why a front end is refused that the project does not have."""
+    return f"there is no front end {name!r}; there are: {', '.join(names())}"
+
+
 @cache
 def named(name: str) -> FrontEnd:
     """A front end of the project."""
     if name not in names():
-        raise Misfit(f"there is no front end {name!r}; there are: {', '.join(names())}")
+        raise Misfit(unknown(name))
     return front_end_of(read(FOLDER / f"{name}.toml"), name)

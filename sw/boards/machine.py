@@ -197,10 +197,7 @@ def axis_of(table: Table) -> Axis:
 def check_front_end(table: Table, group: str, between: Between) -> None:
     """Refuses a front end that is unknown, for other signals or for other levels."""
     if between.front_end not in front_ends.names():
-        raise table.misfit(
-            f"there is no front end {between.front_end!r}; there are: "
-            f"{', '.join(front_ends.names())}"
-        )
+        raise table.misfit(front_ends.unknown(between.front_end))
     found = front_ends.named(between.front_end)
     if group not in found.groups:
         raise table.misfit(f"the front end {found.name} is for {', '.join(found.groups)}")
