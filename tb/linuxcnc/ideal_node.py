@@ -394,7 +394,7 @@ class Served(threading.Thread):
                 self.events.remove(event)
                 event[1](self.node)
             in_session = self.node.session
-            lost = in_session and self.lose(self.node)
+            lost = self.lose(self.node)
             reply = None if lost else self.node.answer(packet)
             if in_session:
                 self.node.advance(PERIOD_CYCLES)

@@ -125,7 +125,7 @@ def test_an_emergency_stop_of_the_node_stops_linuxcnc_and_it_runs_again(tmp_path
 
 def test_some_lost_packets_do_not_move_the_path(tmp_path):
     node = IdealNode(3)
-    with Served(node, lose=lambda node: node.tick % 100 < 4) as served:
+    with Served(node, lose=lambda node: node.session and node.tick % 100 < 4) as served:
         ran = run(tmp_path, served, [["on"], ["home"], ["start", "circle.ngc"], ["finish"]], CIRCLE)
     assert ran.done, ran.printed + str(ran.report)
     errors, _ = CIRCLE["circle"].errors(path_of(node))

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import linuxcnc
 
-PATIENCE_S = 20.0  # of each step, on the clock of the computer
+PATIENCE_S = 120.0  # of each step, on the clock of the computer
 LOOK_S = 0.01
 STEADY_LOOKS = 20  # after which an emergency stop that was reset counts as released
 
