@@ -40,6 +40,7 @@ module node #(
     parameter int HAS_STEPPER = HAS_DRIVE,  // axes with a step generator, needs the drive
     parameter int HAS_DAC = HAS_DRIVE,  // axes with a DAC, needs the drive
     parameter int HAS_FINE_STAGE = HAS_DAC,  // axes with a fine stage, needs the DAC
+    parameter int HAS_SET_POINTS = 0,  // axes that can follow streamed set-points, needs the drive
     parameter int HAS_I2C = 0,  // 1: build the I2C master
     parameter int HAS_PS2 = 0,  // 1: build the PS/2 pass-through
     parameter int HAS_PEER = 0,  // 1: build the peer port
@@ -150,6 +151,8 @@ module node #(
     wire [2:0] result_axis, result_kind;
     wire [47:0] result;
     wire [15:0] cycles;
+    wire [31:0] tick_count;
+    wire [32*AXES-1:0] stream_states, stream_counts;
     // lines of motor steps
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;
@@ -224,6 +227,7 @@ module node #(
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_MONITOR      (HAS_MONITOR),
         .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SET_POINTS   (HAS_SET_POINTS),
         .HAS_SINE         (HAS_SINE),
         .HAS_STEPPER      (HAS_STEPPER),
         .HAS_VELOCITY     (HAS_VELOCITY),
@@ -290,7 +294,9 @@ module node #(
         .start_axes,
         .start_axes_written,
         .wait_time,
-        .wait_time_written
+        .wait_time_written,
+        // streamed set-points
+        .tick_count
     );
 
     // the soft core waits while it has nothing to do
@@ -349,11 +355,12 @@ module node #(
     );
 
     motion #(
-        .AXES        (AXES),
-        .FILTERS     (SERVO_FILTERS),
-        .TICK_CYCLES (CLK_HZ / TICK_HZ),
-        .HAS_VELOCITY(32'(HAS_VELOCITY % (1 << AXES) != 0)),
-        .HAS_STEPPER (32'(HAS_STEPPER % (1 << AXES) != 0))
+        .AXES          (AXES),
+        .FILTERS       (SERVO_FILTERS),
+        .TICK_CYCLES   (CLK_HZ / TICK_HZ),
+        .HAS_VELOCITY  (32'(HAS_VELOCITY % (1 << AXES) != 0)),
+        .HAS_SET_POINTS(HAS_SET_POINTS),
+        .HAS_STEPPER   (32'(HAS_STEPPER % (1 << AXES) != 0))
     ) u_motion (
         .clk,
         .rst,
@@ -378,6 +385,7 @@ module node #(
         .block_up,
         .block_down,
         .closed_loop,
+        .enabled    (drive_enable),
         // requests
         .play,
         .arm,
@@ -385,6 +393,10 @@ module node #(
         .hold_target,
         .request_waits,
         .pending,
+        // streamed set-points
+        .tick_count,
+        .stream_states,
+        .stream_counts,
         // results
         .result_valid,
         .result_axis,
@@ -559,7 +571,8 @@ module node #(
             .HAS_BRIDGE       (HAS_BRIDGE >> n & 1),
             .HAS_STEPPER      (HAS_STEPPER >> n & 1),
             .HAS_DAC          (HAS_DAC >> n & 1),
-            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1)
+            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1),
+            .HAS_SET_POINTS   (HAS_SET_POINTS >> n & 1)
         ) u_axis (
             .clk,
             .rst,
@@ -608,6 +621,9 @@ module node #(
             .result_kind,
             .result,
             .result_flag,
+            // set_point_player
+            .stream_state         (stream_states[32*n+:32]),
+            .stream_counts        (stream_counts[32*n+:32]),
             // step_lines
             .line_start,
             .line_idle,
