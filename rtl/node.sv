@@ -120,6 +120,11 @@ module node #(
     localparam int LIMIT_PERIOD = CLK_HZ / 80_000;  // cycles
     localparam int SERVO_FILTERS = HAS_FILTERS % (1 << AXES) != 0 ? FILTERS : 0;
 
+    // masters of the register bus: the soft core
+    localparam int MASTERS = 1;
+    wire [MASTERS-1:0] master_request, master_ready, master_select, master_write;
+    wire [16*MASTERS-1:0] master_address;
+    wire [32*MASTERS-1:0] master_wdata;
     // register bus
     wire select, write, node_select, bus_select, peripherals_select;
     wire [AXES-1:0] axis_select, feedback_select, actuator_select;
@@ -172,8 +177,6 @@ module node #(
     // interlock
     wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
 
-    wire registers_ready = memory_ready && !engine_waits && !core_waits && !crc_waits;
-
     if (HAS_SERIAL_CORE != 0) begin : g_serial_core
         serial_core #(
             .MEMORY_BYTES (MEMORY_BYTES),
@@ -183,11 +186,12 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (registers_ready),
-            .select,
-            .write,
-            .address(bus_address),
-            .wdata,
+            .request(master_request[0]),
+            .ready  (master_ready[0]),
+            .select (master_select[0]),
+            .write  (master_write[0]),
+            .address(master_address[15:0]),
+            .wdata  (master_wdata[31:0]),
             .rdata,
             .trap,
             // flash
@@ -203,11 +207,12 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (registers_ready),
-            .select,
-            .write,
-            .address(bus_address),
-            .wdata,
+            .request(master_request[0]),
+            .ready  (master_ready[0]),
+            .select (master_select[0]),
+            .write  (master_write[0]),
+            .address(master_address[15:0]),
+            .wdata  (master_wdata[31:0]),
             .rdata,
             .trap
         );
@@ -215,6 +220,27 @@ module node #(
 
         wire unused = &{1'b0, flash_miso};
     end
+    register_arbiter #(
+        .MASTERS(MASTERS),
+        .HOLD   (HAS_SERIAL_CORE != 0 ? 1023 : 63)
+    ) u_arbiter (
+        .clk,
+        .rst,
+        // masters
+        .request   (master_request),
+        .waits     (core_waits || crc_waits),
+        .ready     (master_ready),
+        .select    (master_select),
+        .write     (master_write),
+        .address   (master_address),
+        .wdata     (master_wdata),
+        // register bus
+        .bus_ready (memory_ready && !engine_waits),
+        .bus_select(select),
+        .bus_write (write),
+        .bus_address,
+        .bus_wdata (wdata)
+    );
     register_memory #(
         .AXES             (AXES),
         .FILTERS          (FILTERS == 0 ? 0 : HAS_FILTERS),

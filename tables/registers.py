@@ -296,6 +296,11 @@ class Layout:
         return [literal(9, at) for at, _ in wide]
 
     @property
+    def wide(self) -> list[str]:
+        """Low words of all registers of 64 bits."""
+        return [literal(9, at) for at, r in self.registers if r.wide]
+
+    @property
     def high(self) -> Texts:
         """High words whose write stores both words, if the setting is built."""
         wide = [(at, r) for at, r in self.registers if r.wide and r.stored]
@@ -567,9 +572,10 @@ def files() -> dict[Path, str]:
         )
         for b in blocks
     }
-    made[ROOT / "rtl" / "registers" / "register_layout.sv"] = made_files.systemverilog(
-        filled("layout.sv", layout=layout(blocks))
-    )
+    for name, template in (("register_layout", "layout.sv"), ("wide_registers", "wide.sv")):
+        made[ROOT / "rtl" / "registers" / f"{name}.sv"] = made_files.systemverilog(
+            filled(template, layout=layout(blocks))
+        )
     made[ROOT / "sw" / "firmware" / "made" / "registers.h"] = filled("h", blocks=blocks)
     made[ROOT / "sw" / "host" / "moire" / "made" / "registers.py"] = filled("py", blocks=blocks)
     made[ROOT / "docs" / "registers.md"] = filled("md", blocks=blocks)
