@@ -15,6 +15,7 @@ from tables.made_files import ROOT
 
 SOURCE = ROOT / "tables" / "linuxcnc.toml"
 FOLDER = ROOT / "sw" / "linuxcnc" / "made"
+LISTS = ROOT / "sw" / "linuxcnc" / "config" / "lists.py"
 PAGE = ROOT / "docs" / "linuxcnc.md"
 REGISTERS = ROOT / "sw" / "firmware" / "made" / "registers.h"
 TYPES = {"bit": "HAL_BIT", "float": "HAL_FLOAT", "s32": "HAL_S32", "u32": "HAL_U32"}
@@ -58,6 +59,29 @@ def registers_header() -> str:
     lines = re.findall(rf"^#define (?:{names})\w* (?:\w+)(?=\s|$)", text, re.MULTILINE)
     field = "#define FIELD_GET(word, field) (((uint32_t)(word) & field##_MASK) >> field##_SHIFT)"
     return header("registers", "registers.rdl", [*lines, "", field])
+
+
+def lists_header(table: Table) -> str:
+    """The words of the lists, in their order."""
+    lines: list[str] = []
+    for name, words in table["list"].items():
+        kind = f"{name[:-1].split('_')[1]}_{name.split('_')[0]}".upper()
+        rows = [f"    {kind}_{word.upper()}," for word in words]
+        lines += ["enum {", *rows, f"    {name.upper()}", "};", ""]
+    return header("lists", "linuxcnc.toml", lines[:-1])
+
+
+def lists_table(table: Table) -> str:
+    """The lists for the set-up."""
+    lines = [
+        "# SPDX-License-Identifier: GPL-2.0-or-later",
+        '"""Made by tables/linuxcnc.py from linuxcnc.toml: do not edit."""',
+        "",
+        "# the registers that each packet carries, in their order; a wide one has two words",
+    ]
+    for name, words in table["list"].items():
+        lines += [f"{name.upper()} = (", *(f'    "{word}",' for word in words), ")"]
+    return "\n".join(lines) + "\n"
 
 
 def texts(name: str, rows: dict[int, str]) -> list[str]:
@@ -156,6 +180,8 @@ def made() -> dict[Path, str]:
     return {
         FOLDER / "packet_layout.h": packet_header(),
         FOLDER / "registers.h": registers_header(),
+        FOLDER / "lists.h": lists_header(table),
+        LISTS: lists_table(table),
         FOLDER / "pins.h": pins_header(table, found, by_number(words["state"])),
         PAGE: page(table, found),
     }

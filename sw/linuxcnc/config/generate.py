@@ -7,6 +7,8 @@ MACHINE is a machine of constraints/machines, or a .toml file. docs/linuxcnc.md 
 [linuxcnc] and [axis.linuxcnc] of a machine file.
 """
 
+import random
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import jinja2
 
 from boards import machine as machines
 from boards.toml_file import Misfit, Table, read
+from linuxcnc_config.set_up import LONGEST_SESSION
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 LETTERS = "XYZABCUVW"
@@ -50,10 +53,13 @@ class Configuration:
     name: str
     file: str
     title: str
-    node: str  # udp:HOST:PORT or serial:DEVICE:BAUD
+    address: int  # on the bus
+    bus: str  # port of the bus, for the set-up; empty: another program sets the link up
+    node: str  # real-time link, serial:DEVICE:BAUD or udp:HOST:PORT
     delay_ms: float  # of a set-point
     period_ns: int
     axes: list[Joint]
+    session: int = 0  # of the link; 0: one is drawn for each configuration that is made
     simulated: bool = False
     display: str = "axis"
 
@@ -97,7 +103,7 @@ def load(name: str) -> Configuration:
     if not any(axis.drives for axis in machine.axes):
         raise file.misfit("no axis has a drive: LinuxCNC has nothing to move")
     table = file.table("linuxcnc", True)
-    node = table.take("node", str)
+    bus, node = table.take("bus", str), table.take("node", str)
     if len(node.split(":")) < 3 or node.split(":")[0] not in ("udp", "serial"):
         raise table.misfit(f"node {node!r}: write udp:HOST:PORT or serial:DEVICE:BAUD")
     delay = table.take("delay_ms", float, 5.0)
@@ -107,7 +113,17 @@ def load(name: str) -> Configuration:
     behind = delay + 2 * SERVO_MS
     joints = [joint_of(row, number, behind) for number, row in enumerate(file.rows("axis"))]
     period = round(SERVO_MS * 1e6)
-    return Configuration(machine.name, machine.file, machine.title, node, delay, period, joints)
+    return Configuration(
+        machine.name,
+        machine.file,
+        machine.title,
+        machine.address,
+        bus,
+        node,
+        delay,
+        period,
+        joints,
+    )
 
 
 def texts(found: Configuration) -> dict[str, str]:
@@ -121,6 +137,8 @@ def texts(found: Configuration) -> dict[str, str]:
     )
     values = {
         **{key: getattr(found, key) for key in Configuration.__dataclass_fields__},
+        "session": found.session or random.SystemRandom().randint(1, LONGEST_SESSION),
+        "python": sys.executable,
         "behind_ms": found.behind_ms,
         "letters": "".join(axis.name for axis in found.axes),
         "velocity": max(axis.velocity for axis in found.axes),

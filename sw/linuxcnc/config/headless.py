@@ -4,6 +4,7 @@ the HAL of another. The component is built from its sources and installed in tha
 Needs root, and what `make linuxcnc` installs.
 """
 
+import fcntl
 import json
 import os
 import shlex
@@ -47,13 +48,20 @@ def missing() -> str | None:
 def component() -> Path:
     """The folder with the built component moire.so."""
     BUILD.mkdir(parents=True, exist_ok=True)
+    with (BUILD / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # of another run that builds it
+        build()
+    return BUILD
+
+
+def build() -> None:
+    """Copies what has changed and runs make."""
     for path in [*SOURCES.glob("*.[ch]"), SOURCES / "Makefile", *SOURCES.glob("made/*.h")]:
         copy = BUILD / path.relative_to(SOURCES)
         copy.parent.mkdir(exist_ok=True)
         if not copy.exists() or copy.read_bytes() != path.read_bytes():
             shutil.copy(path, copy)
     subprocess.run(["make", "-s", "-C", str(BUILD)], check=True, capture_output=True, text=True)
-    return BUILD
 
 
 @dataclass(frozen=True)
