@@ -15,7 +15,7 @@ from tables.made_files import ROOT
 
 SOURCE = ROOT / "tables" / "linuxcnc.toml"
 FOLDER = ROOT / "sw" / "linuxcnc" / "made"
-LISTS = ROOT / "sw" / "linuxcnc" / "config" / "lists.py"
+LISTS = ROOT / "sw" / "linuxcnc_config" / "lists.py"
 PAGE = ROOT / "docs" / "linuxcnc.md"
 REGISTERS = ROOT / "sw" / "firmware" / "made" / "registers.h"
 TYPES = {"bit": "HAL_BIT", "float": "HAL_FLOAT", "s32": "HAL_S32", "u32": "HAL_U32"}
@@ -74,13 +74,15 @@ def lists_header(table: Table) -> str:
 def lists_table(table: Table) -> str:
     """The lists for the set-up."""
     lines = [
-        "# SPDX-License-Identifier: GPL-2.0-or-later",
+        "# SPDX-License-Identifier: Apache-2.0",
         '"""Made by tables/linuxcnc.py from linuxcnc.toml: do not edit."""',
         "",
         "# the registers that each packet carries, in their order; a wide one has two words",
     ]
     for name, words in table["list"].items():
-        lines += [f"{name.upper()} = (", *(f'    "{word}",' for word in words), ")"]
+        rows = [f'    "{word}",' for word in words]
+        one = f"{name.upper()} = ({rows[0].strip()})"
+        lines += [one] if len(rows) == 1 else [f"{name.upper()} = (", *rows, ")"]
     return "\n".join(lines) + "\n"
 
 
@@ -112,7 +114,9 @@ def identifier(pin: str) -> str:
     return re.sub(r"\W", "_", pin)
 
 
-def pins_header(table: Table, found: dict[int, tuple[str, str]], states: dict[int, tuple[str, str]]) -> str:
+def pins_header(
+    table: Table, found: dict[int, tuple[str, str]], states: dict[int, tuple[str, str]]
+) -> str:
     """Structures of the pins, the tables by which they are exported, causes and states."""
     lines: list[str] = []
     for scope in SCOPES:

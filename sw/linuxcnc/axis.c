@@ -17,9 +17,7 @@ static const unsigned WARM_UP = 3;           // periods until the commands are t
 enum { MODE_OFF, MODE_PREPARED, MODE_STREAMING, MODE_EXTRAPOLATING, MODE_ENDED };
 enum { ENDED_LATE = 3, ENDED_FAULT = 4 };
 
-static int64_t wide(uint32_t low, uint32_t high) {
-    return (int64_t)((uint64_t)high << 32 | low);
-}
+static int64_t wide(uint32_t low, uint32_t high) { return (int64_t)((uint64_t)high << 32 | low); }
 
 static double scale_of(const struct axis* axis) {
     double scale = *axis->pins.scale;

@@ -27,11 +27,11 @@ enum phase {
 struct axis {
     struct axis_pins pins;
     enum phase phase;
-    unsigned periods;     // since the phase began
-    bool seen;            // the node has begun to home
-    double commands[3];   // the last commanded positions, the newest one last
-    double offset;        // added to them, it falls to 0 after the start
-    double target;        // of the node, machine units
+    unsigned periods;    // since the phase began
+    bool seen;           // the node has begun to home
+    double commands[3];  // the last commanded positions, the newest one last
+    double offset;       // added to them, it falls to 0 after the start
+    double target;       // of the node, machine units
     uint32_t faults, first_fault, mode, ended, state;
 };
 
@@ -50,8 +50,8 @@ void axis_take(struct axis* axis, const uint32_t* words, double tick_s);
 // it may. Sets the pins that answer LinuxCNC.
 void axis_decide(struct axis* axis, uint32_t cause, double period_s);
 
-// The part of the axis in the next request. The set-point is at the commanded position of the period
-// before, `shift_s` later.
+// The part of the axis in the next request. The set-point is at the commanded position of the
+// period before, `shift_s` later.
 struct axis_request axis_give(struct axis* axis, double period_s, double tick_s, double shift_s);
 
 #endif

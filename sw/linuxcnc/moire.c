@@ -61,8 +61,8 @@ static struct link* links;
 // Takes packets until the reply to the last request is there, or the time is over.
 static bool receive(struct link* link) {
     struct node_pins* pins = &link->pins;
-    int64_t wait = simulated ? SIMULATED_NS
-                             : (int64_t)(*pins->packet_read_timeout * (double)NS_PER_MS);
+    int64_t wait =
+        simulated ? SIMULATED_NS : (int64_t)(*pins->packet_read_timeout * (double)NS_PER_MS);
     int64_t deadline = carrier_now() + wait;
     size_t length;
     while ((length = carrier_receive(&link->node.carrier, link->packet, deadline))) {
@@ -122,9 +122,7 @@ static void decide(struct link* link, double period_s) {
     if (*pins->reset && !link->was_reset) *pins->io_error = *pins->watchdog_has_bit = 0;
     link->was_reset = *pins->reset;
     bool in_touch = link->started && !*pins->io_error;
-    uint32_t cause = !in_touch                 ? CAUSE_LINK_LOST
-                     : *pins->watchdog_has_bit ? CAUSE_WATCHDOG
-                                               : 0;
+    uint32_t cause = !in_touch ? CAUSE_LINK_LOST : *pins->watchdog_has_bit ? CAUSE_WATCHDOG : 0;
     uint32_t denied = cause || *pins->enable ? cause : CAUSE_NOT_ALLOWED;
     for (unsigned n = 0; n < link->node.axes; n++) {
         struct axis* axis = &link->axis[n];
@@ -208,12 +206,11 @@ static int export_pins(const struct moire_pin* pins, size_t count, void* of, con
 static int export_link(struct link* link, unsigned number) {
     char name[MOST_NAME];
     rtapi_snprintf(name, sizeof name, "moire.%u", number);
-    int failed =
-        export_pins(NODE_PINS, sizeof NODE_PINS / sizeof *NODE_PINS, &link->pins, name);
+    int failed = export_pins(NODE_PINS, sizeof NODE_PINS / sizeof *NODE_PINS, &link->pins, name);
     for (unsigned n = 0; n < link->node.axes && !failed; n++) {
         rtapi_snprintf(name, sizeof name, "moire.%u.axis.%u", number, n);
-        failed = export_pins(AXIS_PINS, sizeof AXIS_PINS / sizeof *AXIS_PINS,
-                             &link->axis[n].pins, name);
+        failed =
+            export_pins(AXIS_PINS, sizeof AXIS_PINS / sizeof *AXIS_PINS, &link->axis[n].pins, name);
     }
     if (failed) return failed;
     *link->pins.packet_read_timeout = 0.2;

@@ -33,7 +33,8 @@ static bool read_register(struct node* node, uint32_t address, uint32_t* value) 
 static bool check(struct node* node) {
     uint32_t map, build, clock, tick;
     if (!read_register(node, NODE_BASE + NODE_MAP_CRC, &map)) return false;
-    if (map != MAP_CRC) return misfit(node, "the node is of another build: its register map differs");
+    if (map != MAP_CRC)
+        return misfit(node, "the node is of another build: its register map differs");
     if (!read_register(node, NODE_BASE + NODE_BUILD, &build)) return false;
     if (FIELD_GET(build, NODE_BUILD_AXES) != node->axes) {
         snprintf(node->why, sizeof node->why, "the node has %u axes, the configuration has %u",

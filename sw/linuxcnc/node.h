@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// node.h -- a node at the other end of the link, which another program has set up (docs/linuxcnc.md).
+// node.h -- a node at the other end of the link, which another program has set up
+// (docs/linuxcnc.md).
 #ifndef MOIRE_NODE_H
 #define MOIRE_NODE_H
 

@@ -9,6 +9,7 @@ from linuxcnc_config.__main__ import main
 from linuxcnc_config.generate import Misfit, load, texts
 from linuxcnc_config.lists import AXIS_READS, AXIS_WRITES, NODE_READS, NODE_WRITES
 from linuxcnc_config.set_up import Unfit, lists, set_up
+from linuxcnc_config.set_up import main as set_up_program
 from moire.made import link_tables as layout
 from tb.linuxcnc.ideal_node import IdealNode, address
 
@@ -43,7 +44,9 @@ def test_the_configuration_has_the_numbers_of_the_machine_file(tmp_path):
     for line in ("MAX_VELOCITY = 50", "MAX_ACCELERATION = 500", "MIN_LIMIT = -1", "JOINTS = 1"):
         assert f"\n{line}\n" in made["mill.ini"]
     assert "\nsetp moire.0.axis.0.scale 250\n" in made["mill.hal"]  # periods per mm
-    assert re.search(r"set_up --port /dev/ttyUSB0 --address 3 --axes 1 --session \d+", made["mill.hal"])
+    assert re.search(
+        r"set_up --port /dev/ttyUSB0 --address 3 --axes 1 --session \d+", made["mill.hal"]
+    )
     assert 'node="serial:/dev/ttyUSB1:3000000" axes=1 session=' in made["mill.hal"]
 
 
@@ -120,3 +123,9 @@ def test_the_set_up_refuses_a_node_without_a_link():
     node.read_named = lambda name: {"built": 0}
     with pytest.raises(Unfit, match="the node has no real-time link"):
         set_up(node, 1, 5)
+
+
+def test_the_set_up_program_says_in_a_line_why_it_fails(capsys):
+    line = ["--port", "/dev/no_such_port", "--axes", "3", "--session", "5"]
+    assert set_up_program(line) == 1
+    assert re.fullmatch(r"moire: /dev/no_such_port: .*\n", capsys.readouterr().err)

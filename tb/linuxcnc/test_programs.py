@@ -14,15 +14,15 @@ import pytest
 
 from linuxcnc_config import headless
 from linuxcnc_config.generate import load
-from linuxcnc_config.set_up import set_up
 from linuxcnc_config.programs import FIRST_LINE, PROGRAMS, moments
+from linuxcnc_config.set_up import set_up
 from tb.linuxcnc.ideal_node import CLK_HZ, STREAMING, TICK, IdealNode, Served
 
 SESSION = 0x4D01
 PERIODS_PER_MM = 250.0
 TICK_S = TICK / CLK_HZ
 # where the acceleration of 500 mm/s2 steps: the velocity of a set-point, from its two neighbours at
-# 1 ms, differs by a quarter of the step, and the cubic by 4/27 of this over 1 ms; four times in a row
+# 1 ms, differs by a quarter of the step, and the cubic by 4/27 of this over 1 ms; four in a row
 MOST_ERROR_MM = 4 * 500 * 1e-6 / 4 * 4 / 27
 
 
@@ -172,6 +172,9 @@ def test_a_serial_port_of_another_program_is_refused_in_a_sentence(tmp_path):
 
 
 def test_linuxcnc_does_not_start_where_the_set_up_fails(tmp_path):
-    mill = replace(load("mill"), bus="/dev/no_such_port")
+    program = tmp_path / "set_up"
+    program.write_text("#!/bin/sh\necho moire: it does not fit >&2\nexit 1\n")
+    program.chmod(0o755)
+    mill = replace(load("mill"), bus="/dev/ttyUSB0", python="./set_up")
     ran = headless.run(mill, tmp_path, [["on"]])
-    assert ran.exit_code != 0 and "moire: /dev/no_such_port: " in ran.printed
+    assert ran.exit_code != 0 and "moire: it does not fit" in ran.printed

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-2.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Runs LinuxCNC without a screen, in namespaces of its own: several can run at once, and none sees
 the HAL of another. The component is built from its sources and installed in that namespace only.
 Needs root, and what `make linuxcnc` installs.
@@ -21,7 +21,7 @@ from linuxcnc_config.generate import Configuration, write
 
 SOURCES = ROOT / "sw" / "linuxcnc"
 BUILD = ROOT / "build" / "linuxcnc"
-OPERATOR = Path(__file__).resolve().with_name("operator_steps.py")
+OPERATOR = SOURCES / "operator_steps.py"
 MODULES = Path("/usr/lib/linuxcnc/modules")
 RULES = Path("/usr/share/linuxcnc/Makefile.modinc")
 MESSAGES, USUAL_PORT = Path("/usr/share/linuxcnc/linuxcnc.nml"), 5005

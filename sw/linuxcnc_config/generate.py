@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-2.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Makes a configuration of LinuxCNC from a machine file.
 
     python -m linuxcnc_config MACHINE --out FOLDER
@@ -62,6 +62,7 @@ class Configuration:
     session: int = 0  # of the link; 0: one is drawn for each configuration that is made
     simulated: bool = False
     display: str = "axis"
+    python: str = sys.executable  # that runs the set-up
 
     @property
     def behind_ms(self) -> float:
@@ -78,9 +79,7 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     if len(travel) != 2 or not all(isinstance(end, int | float) for end in travel):
         raise table.misfit("travel must be two numbers")
     low, high = (float(end) for end in travel)
-    values = {
-        key: table.take(key, float) for key in ("period_um", "velocity", "acceleration")
-    }
+    values = {key: table.take(key, float) for key in ("period_um", "velocity", "acceleration")}
     for key, value in values.items():
         if not value > 0:
             raise table.misfit(f"{key} {value:g} must be above 0")
@@ -92,7 +91,9 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     sequence = table.take("home_sequence", int, number)
     table.close()
     following = values["velocity"] * behind_ms * 1e-3 * MARGIN
-    return Joint(name, low=low, high=high, rest=rest, sequence=sequence, following=following, **values)
+    return Joint(
+        name, low=low, high=high, rest=rest, sequence=sequence, following=following, **values
+    )
 
 
 def load(name: str) -> Configuration:
@@ -138,7 +139,6 @@ def texts(found: Configuration) -> dict[str, str]:
     values = {
         **{key: getattr(found, key) for key in Configuration.__dataclass_fields__},
         "session": found.session or random.SystemRandom().randint(1, LONGEST_SESSION),
-        "python": sys.executable,
         "behind_ms": found.behind_ms,
         "letters": "".join(axis.name for axis in found.axes),
         "velocity": max(axis.velocity for axis in found.axes),

@@ -87,9 +87,7 @@ class Operator:
             self.command.wait_complete()
         self.command.home(-1)
         joints = range(self.status.joints)
-        done = self.wait(
-            lambda: not self.is_on() or all(self.status.homed[n] for n in joints)
-        )
+        done = self.wait(lambda: not self.is_on() or all(self.status.homed[n] for n in joints))
         return done and self.finish()
 
     def start(self, program):

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-2.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Sets the real-time link of a node up for the driver, over the bus: which registers each packet
 carries, the session, the watchdog. The made HAL file runs it before it loads the driver.
 

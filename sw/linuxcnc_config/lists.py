@@ -1,10 +1,8 @@
-# SPDX-License-Identifier: GPL-2.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Made by tables/linuxcnc.py from linuxcnc.toml: do not edit."""
 
 # the registers that each packet carries, in their order; a wide one has two words
-NODE_READS = (
-    "tick_count",
-)
+NODE_READS = ("tick_count",)
 AXIS_READS = (
     "state",
     "faults",
