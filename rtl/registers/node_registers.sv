@@ -54,7 +54,7 @@ module node_registers (
     wire         unused = &{1'b0, wdata[31:24]};
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'h3092A953) | ({32{get_clk_hz}} & clk_hz) |
+    assign rdata = ({32{get_map_crc}} & 32'h7940EC4E) | ({32{get_clk_hz}} & clk_hz) |
         ({32{get_build}} & {16'd0, build_memory, build_address, build_axes}) | ({32{get_time_stamp}}
         & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high) | ({32{get_tick_count}}
         & tick_count);

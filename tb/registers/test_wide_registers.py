@@ -9,7 +9,7 @@ from tb.registers.wide_registers import low_words
 
 
 @cocotb.test()
-async def latency_is_0_and_each_word_of_the_map_is_reported_as_the_model_says(dut):
+async def latency_is_0_and_each_word_is_reported_as_the_model_says(dut):
     low = low_words()
     assert len(low) > 50 and 0x010 // 4 in low
     for address in [*range(64 * 32), *(1 << n for n in range(11, 14)), (1 << 14) - 1]:
