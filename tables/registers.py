@@ -573,7 +573,7 @@ def files() -> dict[Path, str]:
         )
         for b in blocks
     }
-    for name, template in (("register_layout", "layout.sv"), ("wide_registers", "wide.sv")):
+    for name, template in (("register_layout", "layout.sv"), ("register_width", "width.sv")):
         made[ROOT / "rtl" / "registers" / f"{name}.sv"] = made_files.systemverilog(
             filled(template, layout=layout(blocks))
         )

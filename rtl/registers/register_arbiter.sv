@@ -65,7 +65,7 @@ module register_arbiter #(
         logic [H-1:0] left;  // cycles for which the bus stays reserved without a request
         wire          low;
 
-        wide_registers u_wide (
+        register_width u_wide (
             .address(bus_address[15:2]),
             .low
         );
