@@ -61,13 +61,32 @@ def registers_header() -> str:
     return header("registers", "registers.rdl", [*lines, "", field])
 
 
+def width(name: str) -> int:
+    """Words of a register."""
+    block, _, register = name.partition(".")
+    found = next(one for one in registers.read() if one.name == block)
+    return 2 if next(r for r in found.registers if r.name == register).wide else 1
+
+
 def lists_header(table: Table) -> str:
-    """The words of the lists, in their order."""
-    lines: list[str] = []
-    for name, words in table["list"].items():
-        kind = f"{name[:-1].split('_')[1]}_{name.split('_')[0]}".upper()
-        rows = [f"    {kind}_{word.upper()}," for word in words]
-        lines += ["enum {", *rows, f"    {name.upper()}", "};", ""]
+    """Where the words of each register are in the lists: after `fixed` words, and `each` words for
+    each axis of the node.
+    """
+    lines = ["struct list_place {", "    unsigned fixed, each, width;", "};", ""]
+    for name, names in table["list"].items():
+        fixed = each = 0
+        for register in names:
+            words = width(register)
+            place = f"{{.fixed = {fixed}, .each = {each}, .width = {words}}}"
+            lines.append(
+                f"static const struct list_place {name[:-1].upper()}_"
+                f"{register.replace('.', '_').upper()} = {place};"
+            )
+            if register.startswith("axis."):
+                each += words
+            else:
+                fixed += words
+        lines += [f"enum {{ {name.upper()}_FIXED = {fixed}, {name.upper()}_EACH = {each} }};", ""]
     return header("lists", "linuxcnc.toml", lines[:-1])
 
 
@@ -77,12 +96,10 @@ def lists_table(table: Table) -> str:
         "# SPDX-License-Identifier: Apache-2.0",
         '"""Made by tables/linuxcnc.py from linuxcnc.toml: do not edit."""',
         "",
-        "# the registers that each packet carries, in their order; a wide one has two words",
+        "# the registers that each packet carries, in their order",
     ]
-    for name, words in table["list"].items():
-        rows = [f'    "{word}",' for word in words]
-        one = f"{name.upper()} = ({rows[0].strip()})"
-        lines += [one] if len(rows) == 1 else [f"{name.upper()} = (", *rows, ")"]
+    for name, names in table["list"].items():
+        lines += [f"{name.upper()} = (", *(f'    "{register}",' for register in names), ")"]
     return "\n".join(lines) + "\n"
 
 

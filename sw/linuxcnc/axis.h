@@ -43,8 +43,9 @@ struct axis_request {
     bool commit;
 };
 
-// The words of an axis in a good reply (AXIS_READS of them) go to the pins.
-void axis_take(struct axis* axis, const uint32_t* words, double tick_s);
+// What a good reply says of axis `number` of `axes` goes to its pins.
+void axis_take(struct axis* axis, const uint32_t* words, unsigned axes, unsigned number,
+               double tick_s);
 
 // One period of the axis, after axis_take if a reply has come. `cause`: why no drive may be on; 0:
 // it may. Sets the pins that answer LinuxCNC.

@@ -90,16 +90,13 @@ static void take_reply(struct link* link) {
     count_refused(link);
     if (link->started && link->reply.expired) *pins->watchdog_has_bit = 1;
     const uint32_t* words = link->reply.values;
-    node_clock_take(&link->clock, of->time, words[READ_NODE_TICK_COUNT]);
+    node_clock_take(&link->clock, of->time, words[READ_NODE_TICK_COUNT.fixed]);
     *pins->lateness = link->clock.late / of->clk_hz / MS;
     *pins->drift = node_clock_drift(&link->clock);
-    words += NODE_READS;
-    bool estop = false;
-    for (unsigned n = 0; n < of->axes; n++, words += AXIS_READS) {
-        axis_take(&link->axis[n], words, of->tick / of->clk_hz);
-        estop |= FIELD_GET(words[READ_AXIS_STATE], AXIS_STATE_ESTOP);
-    }
-    *pins->estop = estop;
+    for (unsigned n = 0; n < of->axes; n++)
+        axis_take(&link->axis[n], words, of->axes, n, of->tick / of->clk_hz);
+    uint32_t state = words[list_word(READ_AXIS_STATE, of->axes, 0)];
+    *pins->estop = FIELD_GET(state, AXIS_STATE_ESTOP);
     link->started = true;
 }
 
@@ -156,12 +153,13 @@ static void fill(struct link* link, double period_s) {
     double moment = node_clock_tick(&link->clock, delay_s * to->clk_hz);
     double tick = floor(moment);
     double shift_s = (tick - moment) * tick_s;
-    uint32_t requests = 0, commit = 0, *word = link->values;
+    uint32_t requests = 0, commit = 0, *values = link->values;
     for (unsigned n = 0; n < to->axes; n++) {
         struct axis_request asks = axis_give(&link->axis[n], period_s, tick_s, shift_s);
-        *word++ = (uint32_t)asks.position;
-        *word++ = (uint32_t)((uint64_t)asks.position >> 32);
-        *word++ = (uint32_t)asks.velocity;
+        uint32_t* position = values + list_word(WRITE_AXIS_SET_POINT_POSITION, to->axes, n);
+        position[0] = (uint32_t)asks.position;
+        position[1] = (uint32_t)((uint64_t)asks.position >> 32);
+        values[list_word(WRITE_AXIS_SET_POINT_VELOCITY, to->axes, n)] = (uint32_t)asks.velocity;
         requests |= ((uint32_t)asks.enable << NODE_AXIS_REQUESTS_ENABLE_SHIFT |
                      (uint32_t)asks.home << NODE_AXIS_REQUESTS_HOME_SHIFT |
                      (uint32_t)asks.stream << NODE_AXIS_REQUESTS_STREAM_SHIFT |
@@ -173,9 +171,9 @@ static void fill(struct link* link, double period_s) {
     if (!commit) link->last_tick = whole - LEAST_TICKS;
     if ((int32_t)(whole - link->last_tick) < LEAST_TICKS) commit = 0;
     if (commit) link->last_tick = whole;
-    word[WRITE_NODE_AXIS_REQUESTS] = requests;
-    word[WRITE_NODE_SET_POINT_TICK] = whole;
-    word[WRITE_NODE_SET_POINT_COMMIT] = commit;
+    values[list_word(WRITE_NODE_AXIS_REQUESTS, to->axes, 0)] = requests;
+    values[list_word(WRITE_NODE_SET_POINT_TICK, to->axes, 0)] = whole;
+    values[list_word(WRITE_NODE_SET_POINT_COMMIT, to->axes, 0)] = commit;
 }
 
 static void write_node(void* arg, long period_ns) {

@@ -60,8 +60,8 @@ bool node_open(struct node* node, const char* where, unsigned axes, uint32_t ses
     node->axes = axes;
     node->link = (struct link_session){
         .session = session,
-        .writes = NODE_WRITES + axes * AXIS_WRITES,
-        .reads = NODE_READS + axes * AXIS_READS,
+        .writes = WRITES_FIXED + axes * WRITES_EACH,
+        .reads = READS_FIXED + axes * READS_EACH,
     };
     const char* why = carrier_open(&node->carrier, where);
     if (why) return misfit(node, why);

@@ -29,6 +29,12 @@ struct node {
 // the driver; false with the reason in `why`. Waits for replies: not for a realtime thread.
 bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session);
 
+// The first word of a register of an axis in the lists of a node; of a register of the node, axis
+// 0.
+static inline unsigned list_word(struct list_place place, unsigned axes, unsigned axis) {
+    return place.fixed + axes * place.each + axis * place.width;
+}
+
 // Time of the node in cycles when a request that is sent now will arrive.
 uint32_t node_time(const struct node* node);
 

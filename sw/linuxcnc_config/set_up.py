@@ -8,57 +8,33 @@ carries, the session, the watchdog. The made HAL file runs it before it loads th
 import argparse
 import sys
 from collections.abc import Sequence
-from typing import Any, Protocol
 
-from linuxcnc_config.lists import AXIS_READS, AXIS_WRITES, NODE_READS, NODE_WRITES
+from linuxcnc_config.lists import READS, WRITES
 from moire.bus.transport import open_bus
 from moire.client.bus import Bus
+from moire.client.link import ProcessData
+from moire.client.node import Node
 from moire.errors import MoireError
-from moire.made.registers import BLOCKS, FIELDS
 
-WORD_BYTES = 4
-WATCHDOG_MS = 50
+WATCHDOG_S = 0.05
 LONGEST_SESSION = (1 << 24) - 1
-
-
-class Node(Protocol):
-    """What is used of a node at the bus."""
-
-    def read_named(self, name: str) -> dict[str, Any]: ...
-
-    def write_named(self, name: str, **fields: Any) -> None: ...
 
 
 class Unfit(Exception):
     """One sentence that says why the node cannot be used."""
 
 
-def address(block: str, word: str, axis: int = 0) -> int:
-    """The byte address of a register, or of the word NAME_low or NAME_high of a wide one."""
-    offsets = {field.register: field.offset for field in FIELDS if field.block == block}
-    register, _, half = word.rpartition("_")
-    offset = offsets.get(word)
-    if offset is None:
-        offset = offsets[register] + (WORD_BYTES if half == "high" else 0)
-    base, stride = BLOCKS[block]
-    return base + axis * stride + offset
-
-
-def lists(axes: int) -> tuple[list[int], list[int]]:
-    """The addresses of the write list and of the read list."""
-    writes = [address("axis", word, n) for n in range(axes) for word in AXIS_WRITES]
-    reads = [address("axis", word, n) for n in range(axes) for word in AXIS_READS]
-    return (
-        writes + [address("node", word) for word in NODE_WRITES],
-        [address("node", word) for word in NODE_READS] + reads,
-    )
-
-
 def set_up(
-    node: Node, axes: int, session: int, watchdog_ms: int = WATCHDOG_MS, force: bool = False
+    node: Node,
+    axes: int,
+    session: int,
+    bit_time: int | None = None,
+    watchdog_s: float = WATCHDOG_S,
+    force: bool = False,
 ) -> None:
     """Sets the link of a node up and switches it on; Unfit if it has none, has another number of
-    axes, or serves another host, unless it is to be taken from that by `force`."""
+    axes, or serves another host, unless it is to be taken from that by `force`.
+    """
     state = node.read_named("link.state")
     if not state["built"]:
         raise Unfit("the node has no real-time link")
@@ -67,20 +43,7 @@ def set_up(
         raise Unfit(f"the node has {found} axes, the configuration has {axes}")
     if state["on"] and not state["expired"] and not force:
         raise Unfit(f"another host runs the node, in session {state['session']}")
-    writes, reads = lists(axes)
-    node.write_named("link.enable", value=0)
-    for entry in range(max(len(writes), len(reads))):
-        node.write_named("link.entry_number", value=entry)
-        node.write_named(
-            "link.entry",
-            write=writes[entry] if entry < len(writes) else 0,
-            read=reads[entry] if entry < len(reads) else 0,
-        )
-    node.write_named("link.lists", writes=len(writes), reads=len(reads))
-    node.write_named("link.session", value=session)
-    node.write_named("link.time_window", value=0)
-    node.write_named("link.watchdog_time", value=watchdog_ms)
-    node.write_named("link.enable", value=1)
+    ProcessData(WRITES, READS).set_up(node, bit_time, watchdog_s, session=session)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,9 +7,10 @@ import pytest
 
 from linuxcnc_config.__main__ import main
 from linuxcnc_config.generate import Misfit, load, texts
-from linuxcnc_config.lists import AXIS_READS, AXIS_WRITES, NODE_READS, NODE_WRITES
-from linuxcnc_config.set_up import Unfit, lists, set_up
+from linuxcnc_config.lists import READS, WRITES
+from linuxcnc_config.set_up import Unfit, set_up
 from linuxcnc_config.set_up import main as set_up_program
+from moire.client.link import places
 from moire.made import link_tables as layout
 from tb.linuxcnc.ideal_node import IdealNode, address
 
@@ -97,12 +98,9 @@ def test_the_command_writes_a_folder_and_keeps_own_lines(tmp_path, capsys):
 
 
 def test_eight_axes_fit_into_a_packet():
-    writes, reads = lists(8)
-    assert len(writes) == 8 * len(AXIS_WRITES) + len(NODE_WRITES) <= layout.MOST_VALUES
-    assert len(reads) == 8 * len(AXIS_READS) + len(NODE_READS) <= layout.MOST_VALUES
-    assert writes[-1] == address("node", "set_point_commit")
-    assert writes[3] == address("axis", "set_point_position", 1)
-    assert writes[4] == writes[3] + 4 and reads[1] == address("axis", "state", 0)
+    writes, reads = places(WRITES, 8), places(READS, 8)
+    assert len(writes) <= layout.MOST_VALUES and len(reads) <= layout.MOST_VALUES
+    assert writes[-1].address == address("node", "set_point_commit")
 
 
 def test_the_set_up_refuses_another_number_of_axes_and_another_host():

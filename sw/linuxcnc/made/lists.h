@@ -5,39 +5,28 @@
 
 #include <stdint.h>
 
-enum {
-    READ_NODE_TICK_COUNT,
-    NODE_READS
+struct list_place {
+    unsigned fixed, each, width;
 };
 
-enum {
-    READ_AXIS_STATE,
-    READ_AXIS_FAULTS,
-    READ_AXIS_FIRST_FAULT,
-    READ_AXIS_POSITION_LOW,
-    READ_AXIS_POSITION_HIGH,
-    READ_AXIS_TARGET_LOW,
-    READ_AXIS_TARGET_HIGH,
-    READ_AXIS_VELOCITY,
-    READ_AXIS_FOLLOWING_ERROR,
-    READ_AXIS_STREAM_STATE,
-    READ_AXIS_STREAM_COUNTS,
-    READ_AXIS_SUPERVISION,
-    AXIS_READS
-};
+static const struct list_place READ_NODE_TICK_COUNT = {.fixed = 0, .each = 0, .width = 1};
+static const struct list_place READ_AXIS_STATE = {.fixed = 1, .each = 0, .width = 1};
+static const struct list_place READ_AXIS_FAULTS = {.fixed = 1, .each = 1, .width = 1};
+static const struct list_place READ_AXIS_FIRST_FAULT = {.fixed = 1, .each = 2, .width = 1};
+static const struct list_place READ_AXIS_POSITION = {.fixed = 1, .each = 3, .width = 2};
+static const struct list_place READ_AXIS_TARGET = {.fixed = 1, .each = 5, .width = 2};
+static const struct list_place READ_AXIS_VELOCITY = {.fixed = 1, .each = 7, .width = 1};
+static const struct list_place READ_AXIS_FOLLOWING_ERROR = {.fixed = 1, .each = 8, .width = 1};
+static const struct list_place READ_AXIS_STREAM_STATE = {.fixed = 1, .each = 9, .width = 1};
+static const struct list_place READ_AXIS_STREAM_COUNTS = {.fixed = 1, .each = 10, .width = 1};
+static const struct list_place READ_AXIS_SUPERVISION = {.fixed = 1, .each = 11, .width = 1};
+enum { READS_FIXED = 1, READS_EACH = 12 };
 
-enum {
-    WRITE_AXIS_SET_POINT_POSITION_LOW,
-    WRITE_AXIS_SET_POINT_POSITION_HIGH,
-    WRITE_AXIS_SET_POINT_VELOCITY,
-    AXIS_WRITES
-};
-
-enum {
-    WRITE_NODE_AXIS_REQUESTS,
-    WRITE_NODE_SET_POINT_TICK,
-    WRITE_NODE_SET_POINT_COMMIT,
-    NODE_WRITES
-};
+static const struct list_place WRITE_AXIS_SET_POINT_POSITION = {.fixed = 0, .each = 0, .width = 2};
+static const struct list_place WRITE_AXIS_SET_POINT_VELOCITY = {.fixed = 0, .each = 2, .width = 1};
+static const struct list_place WRITE_NODE_AXIS_REQUESTS = {.fixed = 0, .each = 3, .width = 1};
+static const struct list_place WRITE_NODE_SET_POINT_TICK = {.fixed = 1, .each = 3, .width = 1};
+static const struct list_place WRITE_NODE_SET_POINT_COMMIT = {.fixed = 2, .each = 3, .width = 1};
+enum { WRITES_FIXED = 3, WRITES_EACH = 3 };
 
 #endif
