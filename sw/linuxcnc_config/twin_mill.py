@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The mill of constraints/machines/mill.toml as a twin: three steppers with 1 um scales on one node,
+RTL and firmware, in lockstep with LinuxCNC: each packet is a servo period of the machine's time.
+"""
+
+import random
+import socket
+import threading
+from dataclasses import replace
+from fractions import Fraction
+from types import TracebackType
+from typing import Self
+
+import numpy
+
+from experiments.s2_stage import CLK_HZ, Scale
+from experiments.s2_stage import NODE as STEPPERS
+from linuxcnc_config.generate import Configuration, load
+from linuxcnc_config.programs import Points
+from linuxcnc_config.set_up import set_up
+from moire.bus.cobs import PacketReader, sealed
+from moire.client.bus import Bus
+from moire.made import link_tables as layout
+from twin import Twin, TwinTransport, build
+from twin.nodes.twin import ALL_AXES, Node
+
+PERIOD_S = 4e-3  # a request and a reply of three axes take 2.7 ms of the slow clock of the twin
+DELAY_MS = 12.0  # until a set-point: two periods, the packet, and 4 ticks
+SESSION = 0x4D1
+PARTS = 8  # of a period, at whose ends the positions are recorded
+LONGEST = 4 * layout.LONGEST_WORDS + 8
+LOST = b"?"  # instead of a reply
+SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
+SETTINGS = {"watchdog_time": 0, "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"}
+
+
+class TwinMill:
+    """The powered-up mill, its link set up, served at a UDP port of this computer."""
+
+    def __init__(self, seed: int = 1, axes: int = 3) -> None:
+        parameters = {**STEPPERS, "HAS_SET_POINTS": ALL_AXES, "HAS_LINK": 1}
+        self.twin = Twin(
+            [Node(1, [SCALE.machine()] * axes)],
+            seed=seed,
+            clk_hz=CLK_HZ,
+            firmware=build.firmware("stream"),
+            node_parameters=parameters,
+        )
+        bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed))
+        self.twin.run_until_ready()
+        for number in range(axes):
+            axis = bus.axis(1, number)
+            for name, value in {**SCALE.settings(), **SETTINGS}.items():
+                axis.set_parameter(name, value)
+        self.node, self.axes = bus.node(1), axes
+        self.line = self.twin.link()
+        set_up(self.node, axes, SESSION, bit_time=self.line.bit_time, watchdog_s=0)
+        self.reader = PacketReader(LONGEST)
+        self.path: list[tuple[float, ...]] = []  # mm of each axis, from the index, at each part
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.settimeout(0.1)
+        self.ended = threading.Event()
+        self.thread = threading.Thread(target=self.serve, daemon=True)
+
+    def configuration(self) -> Configuration:
+        """That of LinuxCNC for this twin."""
+        found = load("mill")
+        behind_ms = DELAY_MS + 2e3 * PERIOD_S
+        axes = [
+            replace(axis, following=axis.velocity * behind_ms * 2e-3)
+            for axis in found.axes[: self.axes]
+        ]
+        return replace(
+            found,
+            bus="",
+            node=f"udp:127.0.0.1:{self.socket.getsockname()[1]}",
+            session=SESSION,
+            delay_ms=DELAY_MS,
+            period_ns=round(PERIOD_S * 1e9),
+            axes=axes,
+            simulated=True,
+        )
+
+    def period(self, request: bytes) -> bytes:
+        """A servo period of the machine, with a request at its begin: the reply."""
+        self.line.send(sealed(request))
+        for _ in range(PARTS):
+            self.twin.run(PERIOD_S / PARTS)
+            where = (self.twin.machine(n).state().position_m * 1e3 for n in range(self.axes))
+            self.path.append(tuple(where))
+        replies = list(self.reader.feed(self.line.take()))
+        return replies[-1] if replies else LOST
+
+    def serve(self) -> None:
+        """Answers requests until the end."""
+        while not self.ended.is_set():
+            try:
+                request, host = self.socket.recvfrom(LONGEST)
+            except TimeoutError:
+                continue
+            self.socket.sendto(self.period(request), host)
+
+    def true_path(self) -> Points:
+        """Rows of X, Y, Z in mm, true positions of the tables, from the indexes."""
+        index = SCALE.machine().parameters["scale_index_position"] * 1e3
+        found: Points = numpy.array(self.path) - index
+        return found
+
+    def __enter__(self) -> Self:
+        self.thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.ended.set()
+        self.thread.join()
+        self.socket.close()
+        self.twin.close()
