@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mill of constraints/machines/mill.toml as a twin: three steppers with 1 um scales on one node,
+"""The mill of constraints/machines/mill.toml as a twin: three steppers and 1 um scales on one node,
 RTL and firmware, in lockstep with LinuxCNC: each packet is a servo period of the machine's time.
 """
 
@@ -21,6 +21,7 @@ from linuxcnc_config.set_up import set_up
 from moire.bus.cobs import PacketReader, sealed
 from moire.client.bus import Bus
 from moire.made import link_tables as layout
+from moire.units import Value
 from twin import Twin, TwinTransport, build
 from twin.nodes.twin import ALL_AXES, Node
 
@@ -31,7 +32,7 @@ PARTS = 8  # of a period, at whose ends the positions are recorded
 LONGEST = 4 * layout.LONGEST_WORDS + 8
 LOST = b"?"  # instead of a reply
 SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
-SETTINGS = {"watchdog_time": 0, "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"}
+SETTINGS: dict[str, Value] = {"watchdog_time": 0, "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"}
 
 
 class TwinMill:
@@ -43,14 +44,14 @@ class TwinMill:
             [Node(1, [SCALE.machine()] * axes)],
             seed=seed,
             clk_hz=CLK_HZ,
-            firmware=build.firmware("stream"),
+            firmware=build.firmware("stream", axes),
             node_parameters=parameters,
         )
         bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed))
         self.twin.run_until_ready()
         for number in range(axes):
             axis = bus.axis(1, number)
-            for name, value in {**SCALE.settings(), **SETTINGS}.items():
+            for name, value in (SCALE.settings() | SETTINGS).items():
                 axis.set_parameter(name, value)
         self.node, self.axes = bus.node(1), axes
         self.line = self.twin.link()
@@ -87,7 +88,7 @@ class TwinMill:
         self.line.send(sealed(request))
         for _ in range(PARTS):
             self.twin.run(PERIOD_S / PARTS)
-            where = (self.twin.machine(n).state().position_m * 1e3 for n in range(self.axes))
+            where = (self.twin.machine(n).state.position_m * 1e3 for n in range(self.axes))
             self.path.append(tuple(where))
         replies = list(self.reader.feed(self.line.take()))
         return replies[-1] if replies else LOST
