@@ -16,7 +16,7 @@ from linuxcnc_config.twin_mill import TwinMill
 from moire.errors import MoireError
 from twin.build import ROOT
 
-BENCH = Path(__file__).with_name("linuxcnc_thread.c")
+BENCH = SOURCES / "thread_bench.c"
 PARTS = ("axis", "carrier", "node", "node_clock", "packet")
 OPTIONS = ("-O2", "-std=gnu11", "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-Drealtime")
 MEDIAN_US = 10.0
@@ -67,7 +67,8 @@ def linuxcnc_mill_um(names: Sequence[str] = ("circle",), seed: int = 1) -> float
 def thread_us_max(periods: int = PERIODS) -> float:
     if not RULES.exists():
         raise Absent("linuxcnc-uspace-dev is not installed: make linuxcnc")
-    program = ROOT / "build" / "linuxcnc_thread"
+    program = ROOT / "build" / "linuxcnc" / "thread_bench"
+    program.parent.mkdir(parents=True, exist_ok=True)
     sources = [BENCH, *(SOURCES / f"{name}.c" for name in PARTS)]
     folders = [f"-I{SOURCES}", "-I/usr/include/linuxcnc"]
     links = ["-lz", "-lm", "-lpthread"]

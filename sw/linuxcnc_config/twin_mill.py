@@ -32,7 +32,12 @@ PARTS = 8  # of a period, at whose ends the positions are recorded
 LONGEST = 4 * layout.LONGEST_WORDS + 8
 LOST = b"?"  # instead of a reply
 SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
-SETTINGS: dict[str, Value] = {"watchdog_time": 0, "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"}
+SETTINGS: dict[str, Value] = {
+    "watchdog_time": 0,  # of the bus, which is silent
+    "home_offset": 0,
+    "travel_low": "-2mm",
+    "travel_high": "150mm",
+}
 
 
 class TwinMill:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// linuxcnc_thread.c -- the driver's read and write functions, called as the servo thread calls
+// thread_bench.c -- the driver's read and write functions, called as the servo thread calls
 // them, without LinuxCNC: how much processor time they take. A thread of its own answers as a node.
 //
-//     linuxcnc_thread PERIODS AXES        prints the median and the largest time of read + write,
+//     thread_bench PERIODS AXES        prints the median and the largest time of read + write,
 //     us
 #include <pthread.h>
 #include <stdarg.h>
