@@ -22,6 +22,7 @@ OPTIONS = ("-O2", "-std=gnu11", "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-Drealt
 MEDIAN_US = 10.0
 PERIODS = 100_000
 TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
+STILL_MM = 0.002  # a stepper that settles on its scale of 1 um
 BLEND_MM = {"corners": 0.05}  # tolerance of its G64
 
 
@@ -44,7 +45,7 @@ def errors_mm(names: Sequence[str], seed: int) -> dict[str, float]:
     found: dict[str, float] = {}
     for name in names:
         if ["start", f"{name}.ngc"] in [row["step"] for row in ran.report if row["done"]]:
-            distances, path = PROGRAMS[name].errors(path)
+            distances, path = PROGRAMS[name].errors(path, STILL_MM)
             found[name] = float(distances.max())
             console.print(f"{name}: largest distance from the path {1000 * found[name]:.2f} um")
     return found

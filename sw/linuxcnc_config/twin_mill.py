@@ -35,6 +35,7 @@ SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
 SETTINGS: dict[str, Value] = {
     "watchdog_time": 0,  # of the bus, which is silent
     "home_offset": 0,
+    "ki": 0.0008,
     "travel_low": "-2mm",
     "travel_high": "150mm",
 }
