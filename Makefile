@@ -80,7 +80,7 @@ prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a p
 	$(call say,proofs)
 	@$(PYTHON) -m tools.prove $(if $K,-k '$K') -j $(JOBS)
 
-LATE       := tables/commands.py tables/modules.py tables/readme_figures.py # read what others make
+LATE       := tables/commands.py tables/faults.py tables/modules.py tables/readme_figures.py # read what others make
 GENERATORS := $(filter-out tables/__init__.py tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)
 module      = $(subst /,.,$(basename $(1)))
 tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules

@@ -6,7 +6,7 @@ server and the OpenAPI document are made from it.
 import asyncio
 import re
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields
 from fractions import Fraction
 from http import HTTPStatus
 from importlib.metadata import version
@@ -19,6 +19,7 @@ from moire.bus.protocol import ADDRESSES
 from moire.client import remedies
 from moire.client.access import COUNTS
 from moire.client.axis import REACT_S, Axis
+from moire.client.groups import group_of
 from moire.client.names import CAUSE_CODES, descriptions
 from moire.client.parameters import TRAVEL
 from moire.client.records import Identity, Status
@@ -27,7 +28,6 @@ from moire.errors import MoireError, NoAnswer, Refused
 from moire.made.bus_tables import FAULTS, PARAMETERS
 from moire.web import lissajous, recording
 from moire.web.bridge import Bridge, Client, Moment
-from moire.web.groups import group_of
 from moire.web.jog import HOLD_S
 from moire.web.refusals import BadRequest
 
@@ -465,12 +465,11 @@ async def set_parameters(call: Call) -> Values:
 
 def parameter_values(value: ParameterValue) -> Values:
     """A parameter, with its limits and its default as they are written."""
-    preset = replace(value, counts=PARAMETERS[value.name].default, value=value.default)
     return {
         **value.values(),
         "group": group_of(value.name),
         "allowed": value.range_words,
-        "default_written": preset.written(),
+        "default_written": value.default_written,
     }
 
 
