@@ -461,7 +461,7 @@ def is_wrong_message(message: Any) -> bool:
 METHODS = strategies.sampled_from(("GET", "POST", "PUT", "PATCH", "DELETE"))
 THERE = {"node": "1", "axis": "0", "name": "velocity"}  # of the twin
 TOGETHER = 10  # requests with one query and one body, which take longest to make
-REQUESTS = strategies.tuples(
+REQUEST_GROUPS = strategies.tuples(
     strategies.lists(strategies.tuples(METHODS, PATHS), min_size=TOGETHER, max_size=TOGETHER),
     QUERIES,
     ANYTHING,
@@ -484,7 +484,7 @@ def alone(one: Any) -> list[Any]:
 
 # share of all, and lists of what it is
 INPUT: dict[str, tuple[float, strategies.SearchStrategy[list[Any]]]] = {
-    "asked": (0.4, REQUESTS),
+    "asked": (0.4, REQUEST_GROUPS),
     "message": (0.4, MESSAGE.filter(is_wrong_message).map(alone)),
     "raw": (0.15, RAW.map(alone)),
     "frames": (0.05, FRAMES.map(alone)),
