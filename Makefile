@@ -17,6 +17,7 @@ LINTED   := $(RTL:%.sv=build/lint/%.ok)
 FIRMWARE := build/firmware/firmware.hex
 LITEX    := build/litex/stamp
 GOWIN    := build/gowin/stamp
+DOCS     := build/docs_tools/stamp
 
 say = @printf '%s\n' '--- $(1)'
 
@@ -123,6 +124,14 @@ coverage: $(SETUP) $(FIRMWARE) ## what the tests reach of RTL, firmware and host
 board: $(SETUP)   ## the bitstream and the wiring page of a machine on a board: BOARD=x MACHINE=y; docs/boards.md
 	@$(PYTHON) -m boards.build --board '$(BOARD)' --machine '$(MACHINE)' $(if $(SEED),--seed $(SEED))
 
+docs: $(DOCS)     ## the pages and the reference of the host package as a site in build/docs/site, every link checked
+	@$(PYTHON) -m tools.docs_site
+
+$(DOCS): tools/docs.lock | $(SETUP)
+	@rm -rf $(@D)
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
+	@touch $@
+
 litex: $(LITEX)   ## LiteX into build/litex, for sw/embed/litex_soc.py and its test; docs/embedding.md
 
 $(LITEX): sw/embed/litex.lock | $(SETUP)
@@ -161,4 +170,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board litex gowin chromium ngspice spice clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board docs litex gowin chromium ngspice spice clean
