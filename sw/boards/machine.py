@@ -181,6 +181,7 @@ def axis_of(table: Table) -> Axis:
         table.chosen("features", FEATURES),
         table.chosen("unused", AXIS_SIGNALS),
     )
+    table.left.pop("linuxcnc", None)  # what linuxcnc_config reads
     table.close()
     if not axis.name.isidentifier():
         raise table.misfit(f"name {axis.name!r} must consist of letters, digits and _")
@@ -281,6 +282,7 @@ def load(path: Path) -> Machine:
     """The machine of a machine file."""
     table = read(path)
     title, between = table.take("title", str), between_of(table.table("between"))
+    table.left.pop("linuxcnc", None)  # what linuxcnc_config reads
     layouts = table.table("wiring")
     if {"node", "relay"} <= set(table.left):
         raise table.misfit("a machine has [node] or [relay], not both")
