@@ -332,7 +332,7 @@ class Target:
             if state != "off":
                 self.note(f"the drive is {state}", "")
         except (MoireError, OSError, http.client.HTTPException, ValueError) as error:
-            self.note(f"the server is dead: {error}", "")
+            raise NotMeasured(f"the server is dead after {self.sent} messages: {error}") from None
 
     def judge(self, status: int, body: bytes, sent: object) -> None:
         """An answer is done, or an error with its cause; never a defect of the server."""
@@ -389,6 +389,7 @@ class Target:
         except (OSError, http.client.HTTPException) as error:
             if is_new:
                 self.note(f"the connection ends: {error}", (method, target, body))
+                self.look()
         else:
             return
         self.kept.close()
