@@ -42,7 +42,7 @@ PATIENCE_S = 120  # of the clock: a slow twin is not a dead one
 READ_S = START_S = 3.0
 STREAMS = 20
 BAD = 100_000
-PARTS = 4  # of each kind, in so many processes: the answers take longer than the questions
+PROCESSES = 4  # of each kind, in so many processes: the answers take longer than the questions
 EXAMPLES = 2000  # of one run of Hypothesis, which remembers all of them
 LOOK = 200  # bad messages between two looks at the drive
 CALLS = 11  # of the command line
@@ -541,11 +541,11 @@ def of_one_kind(url: str, name: str, count: int, seed: int) -> Target:
 
 def serve_bad_input(messages: int = BAD, seed: int = 1) -> int:
     parts = [
-        (name, round(messages * share / PARTS), seed + part)
-        for part in range(PARTS)
+        (name, round(messages * share / PROCESSES), seed + part)
+        for part in range(PROCESSES)
         for name, (share, _) in INPUT.items()
     ]
-    with served() as ports, ProcessPoolExecutor(PARTS, get_context("spawn")) as pool:
+    with served() as ports, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
         jobs = [pool.submit(of_one_kind, ports["http"], *part) for part in parts]
         done = [job.result() for job in jobs]
     sent, failed = sum(one.sent for one in done), sum(len(one.failed) for one in done)
