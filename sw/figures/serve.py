@@ -13,10 +13,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing import get_context
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -41,6 +42,7 @@ PATIENCE_S = 120  # of the clock: a slow twin is not a dead one
 READ_S = START_S = 3.0
 STREAMS = 20
 BAD = 100_000
+PROCESSES = 4  # of each kind, in so many processes: the answers take longer than the questions
 EXAMPLES = 2000  # of one run of Hypothesis, which remembers all of them
 LOOK = 200  # bad messages between two looks at the drive
 CALLS = 11  # of the command line
@@ -332,7 +334,7 @@ class Target:
             if state != "off":
                 self.note(f"the drive is {state}", "")
         except (MoireError, OSError, http.client.HTTPException, ValueError) as error:
-            self.note(f"the server is dead: {error}", "")
+            raise NotMeasured(f"the server is dead after {self.sent} messages: {error}") from None
 
     def judge(self, status: int, body: bytes, sent: object) -> None:
         """An answer is done, or an error with its cause; never a defect of the server."""
@@ -347,7 +349,15 @@ class Target:
         elif error.get("cause") == "internal":
             self.note("a defect", sent)
 
-    # three kinds of input
+    def close(self) -> None:
+        """Ends the connections that are kept, which other processes cannot take over."""
+        if self.kept is not None:
+            self.kept.close()
+        if self.stream is not None:
+            self.stream.close()
+        self.kept = self.stream = None
+
+    # four kinds of input
 
     def raw(self, data: bytes) -> None:
         """Bytes that are hardly HTTP, on a connection of their own, which is then closed."""
@@ -389,6 +399,7 @@ class Target:
         except (OSError, http.client.HTTPException) as error:
             if is_new:
                 self.note(f"the connection ends: {error}", (method, target, body))
+                self.look()
         else:
             return
         self.kept.close()
@@ -519,14 +530,27 @@ def limited(examples: int) -> hypothesis.settings:
     )
 
 
+def of_one_kind(url: str, name: str, count: int, seed: int) -> Target:
+    """So many messages of one kind to the server at a URL."""
+    target = Target(url)
+    send_all(getattr(target, name), INPUT[name][1], count, seed)
+    target.look()
+    target.close()
+    return target
+
+
 def serve_bad_input(messages: int = BAD, seed: int = 1) -> int:
-    with served() as ports:
-        target = Target(ports["http"])
-        for name, (share, bad) in INPUT.items():
-            send_all(getattr(target, name), bad, round(messages * share), seed)
-        target.look()
-    console.print(f"{target.sent} messages; {len(target.failed)} with a wrong effect")
-    return len(target.failed)
+    parts = [
+        (name, round(messages * share / PROCESSES), seed + part)
+        for part in range(PROCESSES)
+        for name, (share, _) in INPUT.items()
+    ]
+    with served() as ports, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        jobs = [pool.submit(of_one_kind, ports["http"], *part) for part in parts]
+        done = [job.result() for job in jobs]
+    sent, failed = sum(one.sent for one in done), sum(len(one.failed) for one in done)
+    console.print(f"{sent} messages; {failed} with a wrong effect")
+    return failed
 
 
 FIGURES = {
