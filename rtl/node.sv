@@ -40,6 +40,7 @@ module node #(
     parameter int HAS_STEPPER = HAS_DRIVE,  // axes with a step generator, needs the drive
     parameter int HAS_DAC = HAS_DRIVE,  // axes with a DAC, needs the drive
     parameter int HAS_FINE_STAGE = HAS_DAC,  // axes with a fine stage, needs the DAC
+    parameter int HAS_SET_POINTS = 0,  // axes that can follow streamed set-points, needs the drive
     parameter int HAS_I2C = 0,  // 1: build the I2C master
     parameter int HAS_PS2 = 0,  // 1: build the PS/2 pass-through
     parameter int HAS_PEER = 0,  // 1: build the peer port
@@ -119,6 +120,11 @@ module node #(
     localparam int LIMIT_PERIOD = CLK_HZ / 80_000;  // cycles
     localparam int SERVO_FILTERS = HAS_FILTERS % (1 << AXES) != 0 ? FILTERS : 0;
 
+    // masters of the register bus: the soft core
+    localparam int MASTERS = 1;
+    wire [MASTERS-1:0] master_request, master_ready, master_select, master_write;
+    wire [16*MASTERS-1:0] master_address;
+    wire [32*MASTERS-1:0] master_wdata;
     // register bus
     wire select, write, node_select, bus_select, peripherals_select;
     wire [AXES-1:0] axis_select, feedback_select, actuator_select;
@@ -150,6 +156,8 @@ module node #(
     wire [2:0] result_axis, result_kind;
     wire [47:0] result;
     wire [15:0] cycles;
+    wire [31:0] tick_count;
+    wire [32*AXES-1:0] stream_states, stream_counts;
     // lines of motor steps
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;
@@ -169,8 +177,6 @@ module node #(
     // interlock
     wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
 
-    wire registers_ready = memory_ready && !engine_waits && !core_waits && !crc_waits;
-
     if (HAS_SERIAL_CORE != 0) begin : g_serial_core
         serial_core #(
             .MEMORY_BYTES (MEMORY_BYTES),
@@ -180,11 +186,12 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (registers_ready),
-            .select,
-            .write,
-            .address(bus_address),
-            .wdata,
+            .request(master_request[0]),
+            .ready  (master_ready[0]),
+            .select (master_select[0]),
+            .write  (master_write[0]),
+            .address(master_address[15:0]),
+            .wdata  (master_wdata[31:0]),
             .rdata,
             .trap,
             // flash
@@ -200,11 +207,12 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (registers_ready),
-            .select,
-            .write,
-            .address(bus_address),
-            .wdata,
+            .request(master_request[0]),
+            .ready  (master_ready[0]),
+            .select (master_select[0]),
+            .write  (master_write[0]),
+            .address(master_address[15:0]),
+            .wdata  (master_wdata[31:0]),
             .rdata,
             .trap
         );
@@ -212,6 +220,27 @@ module node #(
 
         wire unused = &{1'b0, flash_miso};
     end
+    register_arbiter #(
+        .MASTERS(MASTERS),
+        .HOLD   (HAS_SERIAL_CORE != 0 ? 1023 : 63)
+    ) u_arbiter (
+        .clk,
+        .rst,
+        // masters
+        .request   (master_request),
+        .waits     (core_waits || crc_waits),
+        .ready     (master_ready),
+        .select    (master_select),
+        .write     (master_write),
+        .address   (master_address),
+        .wdata     (master_wdata),
+        // register bus
+        .bus_ready (memory_ready && !engine_waits),
+        .bus_select(select),
+        .bus_write (write),
+        .bus_address,
+        .bus_wdata (wdata)
+    );
     register_memory #(
         .AXES             (AXES),
         .FILTERS          (FILTERS == 0 ? 0 : HAS_FILTERS),
@@ -224,6 +253,7 @@ module node #(
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_MONITOR      (HAS_MONITOR),
         .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SET_POINTS   (HAS_SET_POINTS),
         .HAS_SINE         (HAS_SINE),
         .HAS_STEPPER      (HAS_STEPPER),
         .HAS_VELOCITY     (HAS_VELOCITY),
@@ -290,7 +320,9 @@ module node #(
         .start_axes,
         .start_axes_written,
         .wait_time,
-        .wait_time_written
+        .wait_time_written,
+        // streamed set-points
+        .tick_count
     );
 
     // the soft core waits while it has nothing to do
@@ -349,11 +381,12 @@ module node #(
     );
 
     motion #(
-        .AXES        (AXES),
-        .FILTERS     (SERVO_FILTERS),
-        .TICK_CYCLES (CLK_HZ / TICK_HZ),
-        .HAS_VELOCITY(32'(HAS_VELOCITY % (1 << AXES) != 0)),
-        .HAS_STEPPER (32'(HAS_STEPPER % (1 << AXES) != 0))
+        .AXES          (AXES),
+        .FILTERS       (SERVO_FILTERS),
+        .TICK_CYCLES   (CLK_HZ / TICK_HZ),
+        .HAS_VELOCITY  (32'(HAS_VELOCITY % (1 << AXES) != 0)),
+        .HAS_SET_POINTS(HAS_SET_POINTS),
+        .HAS_STEPPER   (32'(HAS_STEPPER % (1 << AXES) != 0))
     ) u_motion (
         .clk,
         .rst,
@@ -378,6 +411,7 @@ module node #(
         .block_up,
         .block_down,
         .closed_loop,
+        .enabled    (drive_enable),
         // requests
         .play,
         .arm,
@@ -385,6 +419,10 @@ module node #(
         .hold_target,
         .request_waits,
         .pending,
+        // streamed set-points
+        .tick_count,
+        .stream_states,
+        .stream_counts,
         // results
         .result_valid,
         .result_axis,
@@ -559,7 +597,8 @@ module node #(
             .HAS_BRIDGE       (HAS_BRIDGE >> n & 1),
             .HAS_STEPPER      (HAS_STEPPER >> n & 1),
             .HAS_DAC          (HAS_DAC >> n & 1),
-            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1)
+            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1),
+            .HAS_SET_POINTS   (HAS_SET_POINTS >> n & 1)
         ) u_axis (
             .clk,
             .rst,
@@ -608,6 +647,9 @@ module node #(
             .result_kind,
             .result,
             .result_flag,
+            // set_point_player
+            .stream_state         (stream_states[32*n+:32]),
+            .stream_counts        (stream_counts[32*n+:32]),
             // step_lines
             .line_start,
             .line_idle,

@@ -36,7 +36,8 @@ module node_registers (
     // longest wait of the soft core; writing lets its next access to a register wait for this time,
     // or until a word of the bus is received [cycle]
     output logic [23:0] wait_time,
-    output logic        wait_time_written    // strobe: new value
+    output logic        wait_time_written,   // strobe: new value
+    input  wire  [31:0] tick_count           // servo ticks since reset; wraps [tick]
 );
     logic [31:0] time_stamp_high;
     logic        get_map_crc;
@@ -44,6 +45,7 @@ module node_registers (
     logic        get_build;
     logic        get_time_stamp;
     logic        get_time_stamp_high;
+    logic        get_tick_count;
 
     wire         get = select && !write;
     wire         put = select && write;
@@ -52,9 +54,10 @@ module node_registers (
     wire         unused = &{1'b0, wdata[31:24]};
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'h7C2B604F) | ({32{get_clk_hz}} & clk_hz) |
+    assign rdata = ({32{get_map_crc}} & 32'h3092A953) | ({32{get_clk_hz}} & clk_hz) |
         ({32{get_build}} & {16'd0, build_memory, build_address, build_axes}) | ({32{get_time_stamp}}
-        & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high);
+        & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high) | ({32{get_tick_count}}
+        & tick_count);
 
     always_ff @(posedge clk) begin
         get_map_crc <= get && word == 6'h00;
@@ -62,6 +65,7 @@ module node_registers (
         get_build <= get && word == 6'h02;
         get_time_stamp <= get && word == 6'h04;
         get_time_stamp_high <= get && word == 6'h05;
+        get_tick_count <= get && word == 6'h12;
         if (get_time_stamp) time_stamp_high <= time_stamp[63:32];
 
         if (put && word == 6'h06) tick_period <= wdata[23:0];
@@ -78,6 +82,7 @@ module node_registers (
             get_build <= 1'b0;
             get_time_stamp <= 1'b0;
             get_time_stamp_high <= 1'b0;
+            get_tick_count <= 1'b0;
             time_stamp_high <= '0;
             tick_period <= 24'h000000;
             sample_period <= 16'h0000;

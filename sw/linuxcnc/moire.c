@@ -178,6 +178,7 @@ static void fill(struct link* link, double period_s) {
         commit |= (uint32_t)asks.commit << n;
     }
     uint32_t whole = (uint32_t)(int64_t)tick;
+    if (!commit) link->last_tick = whole - LEAST_TICKS;
     if ((int32_t)(whole - link->last_tick) < LEAST_TICKS) commit = 0;
     if (commit) link->last_tick = whole;
     word[WRITE_AXIS_REQUESTS] = requests;

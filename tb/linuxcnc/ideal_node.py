@@ -31,6 +31,7 @@ CAUSE = {name: code for code, (name, _) in BUS_CAUSES.items()}
 OFF, PREPARED, STREAMING, EXTRAPOLATING, ENDED = range(5)
 NOT_ENDED, RELEASED, STOPPED, LATE, BY_FAULT = range(5)
 LOST = b"?"  # instead of a reply
+WATCHDOG_S = 0.05
 LATE_TICKS = 400  # longest extrapolation
 
 
@@ -188,7 +189,7 @@ class IdealNode:
         self.time = 0  # cycles
         self.tick = 0
         self.estop = False
-        self.pressed_at = 0
+        self.pressed_at = self.heard_at = 0  # cycles
         self.session, self.sequence = 0, 0
         self.lists: dict[int, int] = {}
         self.writes, self.reads = 0, 0
@@ -278,6 +279,9 @@ class IdealNode:
                 requests = self.words.get(address("node", "axis_requests"), 0)
                 for n, axis in enumerate(self.axes):
                     axis.obey(self._asked(requests, n), self.tick)
+            if self.expired:
+                for axis in [axis for axis in self.axes if axis.enabled]:
+                    axis.fault("bus_watchdog")
             for axis in self.axes:
                 axis.run(self.tick)
             self.path.append((self.time / CLK_HZ, *(axis.position for axis in self.axes)))
@@ -295,6 +299,11 @@ class IdealNode:
         for axis in self.axes if pressed else []:
             axis.fault("estop")
 
+    @property
+    def expired(self) -> bool:
+        """Whether the watchdog of the link has expired."""
+        return self.time - self.heard_at > WATCHDOG_S * CLK_HZ
+
     def stopped_for(self, seconds: float) -> bool:
         """Whether the emergency stop has been pressed for so long."""
         return self.estop and self.time - self.pressed_at > seconds * CLK_HZ
@@ -306,6 +315,8 @@ class IdealNode:
         words = struct.unpack(f"<{len(packet) // 4}I", packet) if len(packet) % 4 == 0 else ()
         if not words or zlib.crc32(packet[:-4]) != words[-1]:
             return self._refuse("damaged")
+        if words[0] == layout.KIND_REQUEST and self.expired:
+            self.session = self.sequence = 0
         if words[0] != layout.KIND_REQUEST | self.session << 8:
             return self._refuse("foreign")
         writes = self.writes if self.session else 0
@@ -313,7 +324,7 @@ class IdealNode:
             return self._refuse("wrong_length")
         if not 0 < (words[1] - self.sequence) % WORD < WORD // 2:
             return self._refuse("replayed")
-        self.sequence = words[1]
+        self.sequence, self.heard_at = words[1], self.time
         identity = layout.KIND_REPLY | self.session << 8
         for n, value in enumerate(words[layout.REQUEST_WORDS : layout.REQUEST_WORDS + writes]):
             self.write(self.lists[n] & 0xFFFF, value)
@@ -332,7 +343,8 @@ class IdealNode:
 
     def restart(self) -> None:
         """The node loses its power and starts again."""
-        self.session, self.sequence, self.time, self.tick, self.words = 0, 0, 0, 0, {}
+        self.session = self.sequence = self.time = self.tick = self.heard_at = 0
+        self.words = {}
         self.refused = [0] * len(layout.CAUSES)
         for axis in self.axes:
             axis.__init__(position=axis.position)  # type: ignore[misc]
@@ -381,7 +393,8 @@ class Served(threading.Thread):
             for event in [event for event in self.events if event[0](self.node)]:
                 self.events.remove(event)
                 event[1](self.node)
-            lost, in_session = self.lose(self.node), self.node.session
+            in_session = self.node.session
+            lost = self.lose(self.node)
             reply = None if lost else self.node.answer(packet)
             if in_session:
                 self.node.advance(PERIOD_CYCLES)

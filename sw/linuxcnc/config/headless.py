@@ -8,6 +8,7 @@ import json
 import os
 import shlex
 import shutil
+import socket
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ BUILD = ROOT / "build" / "linuxcnc"
 OPERATOR = Path(__file__).resolve().with_name("operator_steps.py")
 MODULES = Path("/usr/lib/linuxcnc/modules")
 RULES = Path("/usr/share/linuxcnc/Makefile.modinc")
+MESSAGES, USUAL_PORT = Path("/usr/share/linuxcnc/linuxcnc.nml"), 5005
 PRIVATE = Path("/mnt")  # everything of a run, in its own namespace
 PLAIN_USER = 65534  # nobody: LinuxCNC refuses to run as root
 LONGEST_S = 300
@@ -68,6 +70,17 @@ class Run:
         return bool(self.report) and all(row["done"] for row in self.report)
 
 
+def with_own_port(ini: Path) -> None:
+    """Gives the server of LinuxCNC's messages another TCP port than that of other runs."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    text = MESSAGES.read_text(encoding="utf-8").replace(f"={USUAL_PORT}", f"={port}")
+    (ini.parent / MESSAGES.name).write_text(text, encoding="utf-8")
+    head = f"[EMC]\nNML_FILE = {MESSAGES.name}\n"
+    ini.write_text(ini.read_text(encoding="utf-8").replace("[EMC]\n", head), encoding="utf-8")
+
+
 def run(
     found: Configuration,
     folder: Path,
@@ -78,6 +91,7 @@ def run(
     and the G-code of the `programs` by file name."""
     ini = write(replace(found, display=f"./{OPERATOR.name}"), folder)
     shutil.copy(OPERATOR, folder)
+    with_own_port(ini)
     for name, text in (programs or {}).items():
         (folder / name).write_text(text, encoding="utf-8")
     (folder / "steps.json").write_text(json.dumps([list(step) for step in steps]))

@@ -23,8 +23,9 @@ from pathlib import Path
 
 import linuxcnc
 
-PATIENCE_S = 20.0  # of each step, on the clock of the computer
+PATIENCE_S = 120.0  # of each step, on the clock of the computer
 LOOK_S = 0.01
+STEADY_LOOKS = 20  # after which an emergency stop that was reset counts as released
 
 
 class Operator:
@@ -57,18 +58,30 @@ class Operator:
         return self.status.interp_state == linuxcnc.INTERP_IDLE and self.status.inpos
 
     def on(self):
-        def ready():
-            if self.status.task_state == linuxcnc.STATE_ESTOP:
-                self.command.state(linuxcnc.STATE_ESTOP_RESET)
-            elif self.status.task_state == linuxcnc.STATE_ESTOP_RESET:
-                self.command.state(linuxcnc.STATE_ON)
-            return self.is_on()
+        looks, released = 0, (linuxcnc.STATE_ESTOP_RESET, linuxcnc.STATE_ON)
 
-        return self.wait(ready)
+        def is_reset():
+            nonlocal looks
+            if looks == 0 or self.status.task_state not in released:
+                looks = 0
+                self.command.state(linuxcnc.STATE_ESTOP_RESET)
+                self.command.wait_complete()
+            looks += 1
+            return looks > STEADY_LOOKS
+
+        if not self.wait(is_reset):
+            return False
+        self.command.state(linuxcnc.STATE_ON)
+        return self.wait(self.is_on)
 
     def home(self):
         self.command.mode(linuxcnc.MODE_MANUAL)
         self.command.wait_complete()
+        if any(self.status.homed[n] for n in range(self.status.joints)):
+            self.command.teleop_enable(0)
+            self.command.wait_complete()
+            self.command.unhome(-1)
+            self.command.wait_complete()
         self.command.home(-1)
         joints = range(self.status.joints)
         done = self.wait(
@@ -119,8 +132,6 @@ def main():
         report.append(operator.obey(step))
         if not report[-1]["done"]:
             break
-    import subprocess  # DEBUG
-    report[-1]["pins"] = subprocess.run("halcmd show pin moire.0 | grep -v axis.[12]; halcmd show sig", shell=True, capture_output=True, text=True).stdout
     Path("report.json").write_text(json.dumps(report), encoding="utf-8")
     return 0
 

@@ -137,9 +137,9 @@ class Program:
         """
         resting = numpy.linalg.norm(path[REST:] - path[:-REST], axis=1) < STILL_MM
         began = first(resting & at(path, self.start), 0, "the start")
-        moved = first(~resting, began, "a motion")
+        moved = first(~at(path, self.start), began, "a motion")
         ended = first(resting & at(path, self.place), moved, "the end")
-        part = path[moved:ended]
+        part = path[began:ended]
         distances = numpy.min([move.distances(part) for move in self.moves], axis=0)
         return distances, path[ended:]
 

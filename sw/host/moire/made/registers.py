@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x7C2B604F  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x3092A953  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -114,6 +114,62 @@ FIELDS = (
         Fraction(1, 1),
         "longest wait of the soft core; writing lets its next access to a register wait for "
         "this time, or until a word of the bus is received",
+    ),
+    Field(
+        "node", "set_point_tick", "value",
+        0x40, 0, 32, False, "rw", "tick",
+        Fraction(1, 1),
+        "tick_count at which the axes are to be at the set-points that are committed next",
+    ),
+    Field(
+        "node", "set_point_commit", "value",
+        0x44, 0, 8, False, "rw", "",
+        Fraction(1, 1),
+        "axes whose set-points are committed, bit n: axis n; writing queues those of all "
+        "these axes at once, for set_point_tick",
+    ),
+    Field(
+        "node", "tick_count", "value",
+        0x48, 0, 32, False, "r", "tick",
+        Fraction(1, 1),
+        "servo ticks since reset; wraps",
+    ),
+    Field(
+        "node", "late_limit", "value",
+        0x4C, 0, 16, False, "rw", "tick",
+        Fraction(1, 1),
+        "longest extrapolation of a stream whose next set-point is late",
+    ),
+    Field(
+        "node", "axis_requests", "enable",
+        0x50, 0, 8, False, "rw", "",
+        Fraction(1, 1),
+        "1: the drive is to be on",
+    ),
+    Field(
+        "node", "axis_requests", "home",
+        0x50, 8, 8, False, "rw", "",
+        Fraction(1, 1),
+        "rising: home",
+    ),
+    Field(
+        "node", "axis_requests", "stream",
+        0x50, 16, 8, False, "rw", "",
+        Fraction(1, 1),
+        "1: the axis is to follow set-points; falling ends its stream",
+    ),
+    Field(
+        "node", "axis_requests", "reset_faults",
+        0x50, 24, 8, False, "rw", "",
+        Fraction(1, 1),
+        "rising: reset the faults",
+    ),
+    Field(
+        "node", "stream_axes", "value",
+        0x54, 0, 8, False, "rw", "",
+        Fraction(1, 1),
+        "axes that follow set-points, bit n: axis n; the firmware sets a bit after its "
+        "checks, and a stream that has ended needs it to fall",
     ),
     Field(
         "bus", "bit_time", "value",
@@ -816,6 +872,30 @@ FIELDS = (
         "largest |target - position| in closed loop; 0: not checked",
     ),
     Field(
+        "axis", "supervision", "state",
+        0x24, 0, 4, False, "rw", "",
+        Fraction(1, 1),
+        "state of the axis, as in the reply of status",
+    ),
+    Field(
+        "axis", "supervision", "homed",
+        0x24, 4, 1, False, "rw", "",
+        Fraction(1, 1),
+        "1: homed",
+    ),
+    Field(
+        "axis", "supervision", "ended",
+        0x24, 8, 8, False, "rw", "",
+        Fraction(1, 1),
+        "how the last motion has ended, a cause of the bus",
+    ),
+    Field(
+        "axis", "supervision", "refusal",
+        0x24, 16, 8, False, "rw", "",
+        Fraction(1, 1),
+        "why the last request of axis_requests was refused, a cause of the bus; 0: it was not",
+    ),
+    Field(
         "axis", "position", "value",
         0x28, 0, 48, True, "r", "period",
         Fraction(1, 65536),
@@ -1069,10 +1149,72 @@ FIELDS = (
         "SEGMENTS: most segments of the table; 0: none",
     ),
     Field(
+        "axis", "built", "set_points",
+        0x6C, 24, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_SET_POINTS: player of streamed set-points",
+    ),
+    Field(
         "axis", "integral_limit", "value",
         0x70, 0, 15, False, "rw", "",
         Fraction(1, 1),
         "largest |integral term|; full scale 2^15",
+    ),
+    Field(
+        "axis", "stream_velocity_limit", "value",
+        0x74, 0, 31, False, "rw", "period/tick",
+        Fraction(1, 16777216),
+        "largest |velocity| of a stream",
+    ),
+    Field(
+        "axis", "stream_state", "mode",
+        0x78, 0, 3, False, "r", "",
+        Fraction(1, 1),
+        "0 off, 1 prepared, without a set-point yet, 2 streaming, 3 extrapolating, 4 ended",
+    ),
+    Field(
+        "axis", "stream_state", "ended",
+        0x78, 3, 3, False, "r", "",
+        Fraction(1, 1),
+        "how the last stream ended: 0 not, 1 released at rest, 2 stopped, 3 set-point late, 4 "
+        "fault",
+    ),
+    Field(
+        "axis", "stream_state", "refusal",
+        0x78, 6, 3, False, "r", "",
+        Fraction(1, 1),
+        "why the last set-point was refused: 0 none was, 1 late, 2 limits, 3 out of travel, 4 "
+        "queue full, 5 incomplete, 6 not streamed, 7 more than 255 ticks ahead",
+    ),
+    Field(
+        "axis", "stream_state", "room",
+        0x78, 9, 5, False, "r", "",
+        Fraction(1, 1),
+        "set-points that can be committed",
+    ),
+    Field(
+        "axis", "stream_state", "extrapolated",
+        0x78, 16, 16, False, "r", "tick",
+        Fraction(1, 1),
+        "ticks extrapolated since the stream began; wraps",
+    ),
+    Field(
+        "axis", "stream_counts", "accepted",
+        0x7C, 0, 16, False, "r", "",
+        Fraction(1, 1),
+        "set-points since the stream began; the counts wrap: accepted",
+    ),
+    Field(
+        "axis", "stream_counts", "late",
+        0x7C, 16, 8, False, "r", "",
+        Fraction(1, 1),
+        "late ones",
+    ),
+    Field(
+        "axis", "stream_counts", "refused",
+        0x7C, 24, 8, False, "r", "",
+        Fraction(1, 1),
+        "those refused for another cause",
     ),
     Field(
         "axis", "kp", "value",
@@ -1214,6 +1356,36 @@ FIELDS = (
         0xDC, 0, 32, False, "rw", "cycle",
         Fraction(1, 1),
         "time stamp of an armed start",
+    ),
+    Field(
+        "axis", "set_point_position", "value",
+        0xE0, 0, 48, True, "rw", "period",
+        Fraction(1, 65536),
+        "position of the next set-point",
+    ),
+    Field(
+        "axis", "stream_travel_low", "value",
+        0xE8, 0, 48, True, "rw", "period",
+        Fraction(1, 65536),
+        "lowest position of a stream",
+    ),
+    Field(
+        "axis", "stream_travel_high", "value",
+        0xF0, 0, 48, True, "rw", "period",
+        Fraction(1, 65536),
+        "highest position of a stream",
+    ),
+    Field(
+        "axis", "set_point_velocity", "value",
+        0xF8, 0, 32, True, "rw", "period/tick",
+        Fraction(1, 16777216),
+        "velocity of the next set-point",
+    ),
+    Field(
+        "axis", "stream_acceleration_limit", "value",
+        0xFC, 0, 32, False, "rw", "period/tick2",
+        Fraction(1, 4294967296),
+        "largest |acceleration| of a stream",
     ),
     Field(
         "feedback", "edge_filter", "skip",
