@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from boards import front_ends
-from boards.toml_file import ROOT, Misfit, Table, read
+from boards.toml_file import ROOT, Misfit, Table, read, shown
 from firmware.build import IMAGES
 from moire.bus.protocol import MOST_AXES
 
@@ -146,6 +146,12 @@ class Machine:
     wiring: dict[str, Wiring]  # by layout
 
     @property
+    def argument(self) -> str:
+        """What names it in a command of make."""
+        own = FOLDER / f"{self.name}.toml"
+        return self.name if self.file == shown(own) else self.file
+
+    @property
     def module(self) -> str:
         """The module of rtl/ that it is."""
         return "relay" if self.orders else "node"
@@ -181,6 +187,7 @@ def axis_of(table: Table) -> Axis:
         table.chosen("features", FEATURES),
         table.chosen("unused", AXIS_SIGNALS),
     )
+    table.left.pop("linuxcnc", None)  # what linuxcnc_config reads
     table.close()
     if not axis.name.isidentifier():
         raise table.misfit(f"name {axis.name!r} must consist of letters, digits and _")
@@ -281,6 +288,7 @@ def load(path: Path) -> Machine:
     """The machine of a machine file."""
     table = read(path)
     title, between = table.take("title", str), between_of(table.table("between"))
+    table.left.pop("linuxcnc", None)  # what linuxcnc_config reads
     layouts = table.table("wiring")
     if {"node", "relay"} <= set(table.left):
         raise table.misfit("a machine has [node] or [relay], not both")
