@@ -66,6 +66,7 @@ INPUTS = (
         "sync",
         "estop",
         "watchdog_expired",
+        "link_expired",
     ),
     *("cpu_stopped", "encoder_a", "encoder_b", "encoder_z", "probe", "adc_sin", "adc_cos"),
     *("limit_low_open", "limit_high_open"),
