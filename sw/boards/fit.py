@@ -9,6 +9,7 @@ from boards.machine import DRIVES, FEATURES, Between, Machine, Signal, Wiring
 from boards.toml_file import Misfit, TooLarge
 
 TICK_HZ = 4000  # servo tick that the firmware sets
+PLACEHOLDER = "placeholder"  # of the firmware; the name of its file
 
 
 @dataclass(frozen=True)
@@ -43,9 +44,26 @@ class Design:
         return f"{self.board.name}-{self.machine.name}"
 
     @property
+    def in_block_ram(self) -> bool:
+        """Whether the firmware is in block RAMs of a placed design, which is then placed with a
+        placeholder.
+        """
+        return has_placeholder(self.board, self.machine)
+
+    @property
+    def arguments(self) -> str:
+        """What names it in a command of make."""
+        return f"BOARD={self.board.name} MACHINE={self.machine.argument}"
+
+    @property
     def firmware_address(self) -> int:
         """Byte address of the firmware in the flash, for a serial core; behind the bitstream."""
         return int(self.parameters["FLASH_START"])
+
+
+def has_placeholder(board: Board, machine: Machine) -> bool:
+    placer = board.part.family.placer
+    return machine.core == "soft" and placer is not None and placer.contents is not None
 
 
 def mask(machine: Machine, name: str) -> int:
@@ -73,8 +91,8 @@ def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
         **board.part.node,
     }
     if machine.core == "soft":
-        stem = size.firmware_stem(machine)
-        found["FIRMWARE"] = f"build/boards/{board.name}-{machine.name}/{stem}.hex"
+        words = PLACEHOLDER if has_placeholder(board, machine) else size.firmware_stem(machine)
+        found["FIRMWARE"] = f"build/boards/{board.name}-{machine.name}/{words}.hex"
     return found
 
 

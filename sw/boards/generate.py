@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is made of a machine on a board: its top, its constraints, its wiring page and drawing."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,8 +9,9 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from boards import block_ram
 from boards.board import FLASH, LEDS, Pad
-from boards.fit import Connection, Design
+from boards.fit import PLACEHOLDER, Connection, Design
 from boards.machine import AXIS_SIGNALS, RELAY_SIGNALS
 
 TEMPLATES = Environment(
@@ -234,7 +236,6 @@ def page(design: Design) -> str:
         unconnected=unconnected(design),
         front_ends=FRONT_ENDS,
         level=level,
-        bitstream=design.board.part.family.bitstream,
     )
 
 
@@ -250,16 +251,28 @@ def top(design: Design) -> str:
     )
 
 
+def placeholder(design: Design) -> list[int]:
+    """The words that a design is placed with in place of its firmware."""
+    return block_ram.placeholder(256 * design.machine.memory_kib)
+
+
+def hex_text(words: Iterable[int]) -> str:
+    """Words of 32 bits as a file for $readmemh."""
+    return "".join(f"{word:08x}\n" for word in words)
+
+
 def files(design: Design) -> dict[str, str]:
     """{name: text} of all that is made before any tool runs."""
     family = design.board.part.family
     constraints, script = family.constraints, family.script
-    for_vendor = {}
+    more = {}
     if script:
         template = TEMPLATES.get_template(f"{script}.jinja")
-        for_vendor[script] = template.render(d=design, bitstream=design.board.part.family.bitstream)
+        more[script] = template.render(d=design, bitstream=design.board.part.family.bitstream)
+    if design.in_block_ram:
+        more[f"{PLACEHOLDER}.hex"] = hex_text(placeholder(design))
     return {
-        **for_vendor,
+        **more,
         "top.sv": top(design),
         constraints: TEMPLATES.get_template(f"{constraints}.jinja").render(
             d=design, pins=pins(design)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from boards import front_ends
-from boards.toml_file import ROOT, Misfit, Table, read
+from boards.toml_file import ROOT, Misfit, Table, read, shown
 from firmware.build import IMAGES
 from moire.bus.protocol import MOST_AXES
 
@@ -144,6 +144,12 @@ class Machine:
     axes: list[Axis]
     unused: list[str]  # signals of the node that are not connected
     wiring: dict[str, Wiring]  # by layout
+
+    @property
+    def argument(self) -> str:
+        """What names it in a command of make."""
+        own = FOLDER / f"{self.name}.toml"
+        return self.name if self.file == shown(own) else self.file
 
     @property
     def module(self) -> str:

@@ -487,7 +487,7 @@ def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
         ("fly", "there is no command 'fly' (see: moire --help)"),
         ("hom", "there is no command 'hom', did you mean home?"),
         ("capture reed", "there is no command 'reed', did you mean read?"),
-        ("status --adress 2", "there is no option '--adress', did you mean --address?"),
+        ("status --adress 2", "there is no option '--adress', did you mean --address"),
         ("move 1mm 2mm", "'2mm' is one argument too many (see: moire move --help)"),
         ("status --port", "requires an argument"),
         ("job load", "give either FILE or --equal N"),

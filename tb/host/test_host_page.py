@@ -10,10 +10,10 @@ from importlib.resources import files
 import pytest
 
 from moire.client.axis import Axis
+from moire.client.groups import BEGINNINGS, OTHERS, group_of
 from moire.made.bus_tables import PARAMETERS
 from moire.web import jog, page
 from moire.web.client import ServerRefused
-from moire.web.groups import BEGINNINGS, OTHERS, group_of
 from tb.fakes.served import HANG_S, Http, Served, homed
 
 AXIS = "/api/nodes/1/axes/0"

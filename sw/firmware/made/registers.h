@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x7940ec4eu  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xc94cc514u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -141,6 +141,10 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_BUILD_MEMORY_MASK 0x0000ff00u
 #define NODE_BUILD_MEMORY_SHIFT 8
 #define NODE_BUILD_MEMORY_WIDTH 8
+// SCOPE_WORDS: words of the recorder of ticks; 0: there is none, and no excitation
+#define NODE_BUILD_SCOPE_MASK 0x01ff0000u
+#define NODE_BUILD_SCOPE_SHIFT 16
+#define NODE_BUILD_SCOPE_WIDTH 9
 // r: cycles since reset; every time stamp is a part of it [cycle]
 #define NODE_TIME_STAMP 0x010u
 #define NODE_TIME_STAMP_LOW 0x010u
@@ -173,6 +177,45 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_WAIT_TIME_MASK 0x00ffffffu
 #define NODE_WAIT_TIME_SHIFT 0
 #define NODE_WAIT_TIME_WIDTH 24
+// rw: what the recorder of ticks records
+#define NODE_SCOPE 0x030u
+// number of the axis
+#define NODE_SCOPE_AXIS_MASK 0x00000007u
+#define NODE_SCOPE_AXIS_SHIFT 0
+#define NODE_SCOPE_AXIS_WIDTH 3
+// bit n: 0 sine and cosine, 1 target, 2 target velocity, 3 velocity, 4 error, 5 command
+#define NODE_SCOPE_SIGNALS_MASK 0x000001f8u
+#define NODE_SCOPE_SIGNALS_SHIFT 3
+#define NODE_SCOPE_SIGNALS_WIDTH 6
+// rw: samples of a recording
+#define NODE_SCOPE_SAMPLES 0x034u
+// samples
+#define NODE_SCOPE_SAMPLES_LENGTH_MASK 0x0000ffffu
+#define NODE_SCOPE_SAMPLES_LENGTH_SHIFT 0
+#define NODE_SCOPE_SAMPLES_LENGTH_WIDTH 16
+// from sample to sample; 0 acts as 1 [tick]
+#define NODE_SCOPE_SAMPLES_EVERY_MASK 0xffff0000u
+#define NODE_SCOPE_SAMPLES_EVERY_SHIFT 16
+#define NODE_SCOPE_SAMPLES_EVERY_WIDTH 16
+// rw: state of the recording
+#define NODE_SCOPE_STATE 0x038u
+// begins a recording, at the first value of a waveform that runs
+#define NODE_SCOPE_STATE_START_MASK 0x00000001u
+#define NODE_SCOPE_STATE_START_SHIFT 0
+#define NODE_SCOPE_STATE_START_WIDTH 1
+// it is not complete
+#define NODE_SCOPE_STATE_RECORDING_MASK 0x00000002u
+#define NODE_SCOPE_STATE_RECORDING_SHIFT 1
+#define NODE_SCOPE_STATE_RECORDING_WIDTH 1
+// it is complete
+#define NODE_SCOPE_STATE_FULL_MASK 0x00000004u
+#define NODE_SCOPE_STATE_FULL_SHIFT 2
+#define NODE_SCOPE_STATE_FULL_WIDTH 1
+// r: word of the recording; reading advances to the next one
+#define NODE_SCOPE_WORD 0x03cu
+#define NODE_SCOPE_WORD_MASK 0xffffffffu
+#define NODE_SCOPE_WORD_SHIFT 0
+#define NODE_SCOPE_WORD_WIDTH 32
 // rw: tick_count at which the axes are to be at the set-points that are committed next [tick]
 #define NODE_SET_POINT_TICK 0x040u
 #define NODE_SET_POINT_TICK_MASK 0xffffffffu
@@ -219,6 +262,30 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_STREAM_AXES_MASK 0x000000ffu
 #define NODE_STREAM_AXES_SHIFT 0
 #define NODE_STREAM_AXES_WIDTH 8
+// rw: waveform that is added to the commands of an axis
+#define NODE_EXCITATION 0x060u
+// number of the axis
+#define NODE_EXCITATION_AXIS_MASK 0x00000007u
+#define NODE_EXCITATION_AXIS_SHIFT 0
+#define NODE_EXCITATION_AXIS_WIDTH 3
+// values of the waveform, one for each tick, 4096 at most; 0: nothing is added [tick]
+#define NODE_EXCITATION_PERIOD_MASK 0x0000fff8u
+#define NODE_EXCITATION_PERIOD_SHIFT 3
+#define NODE_EXCITATION_PERIOD_WIDTH 13
+// largest |command| with it, full scale 2^15
+#define NODE_EXCITATION_LIMIT_MASK 0x7fff0000u
+#define NODE_EXCITATION_LIMIT_SHIFT 16
+#define NODE_EXCITATION_LIMIT_WIDTH 15
+// w: value of the waveform; writing stores it
+#define NODE_EXCITATION_VALUE 0x064u
+// full scale 2^15
+#define NODE_EXCITATION_VALUE_MASK 0x0000ffffu
+#define NODE_EXCITATION_VALUE_SHIFT 0
+#define NODE_EXCITATION_VALUE_WIDTH 16
+// its number
+#define NODE_EXCITATION_VALUE_AT_MASK 0x0fff0000u
+#define NODE_EXCITATION_VALUE_AT_SHIFT 16
+#define NODE_EXCITATION_VALUE_AT_WIDTH 12
 
 // RS-485 bus: 9-bit UART, address filter, frame check, watchdog
 // rw: duration of one bit [1/16 cycle]

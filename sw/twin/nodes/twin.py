@@ -72,6 +72,7 @@ NODE = {**drives("HAS_BRIDGE"), "FILTERS": 0}  # what the stage of S0 needs of r
 WITH_SEGMENTS = {
     **NODE,
     "SEGMENTS": 255,
+    "SCOPE_WORDS": 16384,
 }  # and with its segment table, which takes a fifteenth of the speed
 BAUD = 115200
 BREAK_S = 0.003  # the line low; nodes want 2 ms

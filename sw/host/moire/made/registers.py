@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x7940EC4E  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xC94CC514  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -78,6 +78,12 @@ FIELDS = (
         "what is built: memory",
     ),
     Field(
+        "node", "build", "scope",
+        0x08, 16, 9, False, "r", "",
+        Fraction(256, 1),
+        "SCOPE_WORDS: words of the recorder of ticks; 0: there is none, and no excitation",
+    ),
+    Field(
         "node", "time_stamp", "value",
         0x10, 0, 64, False, "r", "cycle",
         Fraction(1, 1),
@@ -115,6 +121,55 @@ FIELDS = (
         Fraction(1, 1),
         "longest wait of the soft core; writing lets its next access to a register wait for "
         "this time, or until a word of the bus is received",
+    ),
+    Field(
+        "node", "scope", "axis",
+        0x30, 0, 3, False, "rw", "",
+        Fraction(1, 1),
+        "number of the axis",
+    ),
+    Field(
+        "node", "scope", "signals",
+        0x30, 3, 6, False, "rw", "",
+        Fraction(1, 1),
+        "bit n: 0 sine and cosine, 1 target, 2 target velocity, 3 velocity, 4 error, 5 "
+        "command",
+    ),
+    Field(
+        "node", "scope_samples", "length",
+        0x34, 0, 16, False, "rw", "",
+        Fraction(1, 1),
+        "samples",
+    ),
+    Field(
+        "node", "scope_samples", "every",
+        0x34, 16, 16, False, "rw", "tick",
+        Fraction(1, 1),
+        "from sample to sample; 0 acts as 1",
+    ),
+    Field(
+        "node", "scope_state", "start",
+        0x38, 0, 1, False, "w", "",
+        Fraction(1, 1),
+        "begins a recording, at the first value of a waveform that runs",
+    ),
+    Field(
+        "node", "scope_state", "recording",
+        0x38, 1, 1, False, "r", "",
+        Fraction(1, 1),
+        "it is not complete",
+    ),
+    Field(
+        "node", "scope_state", "full",
+        0x38, 2, 1, False, "r", "",
+        Fraction(1, 1),
+        "it is complete",
+    ),
+    Field(
+        "node", "scope_word", "value",
+        0x3C, 0, 32, False, "r", "",
+        Fraction(1, 1),
+        "word of the recording; reading advances to the next one",
     ),
     Field(
         "node", "set_point_tick", "value",
@@ -171,6 +226,36 @@ FIELDS = (
         Fraction(1, 1),
         "axes that follow set-points, bit n: axis n; the firmware sets a bit after its "
         "checks, and a stream that has ended needs it to fall",
+    ),
+    Field(
+        "node", "excitation", "axis",
+        0x60, 0, 3, False, "rw", "",
+        Fraction(1, 1),
+        "number of the axis",
+    ),
+    Field(
+        "node", "excitation", "period",
+        0x60, 3, 13, False, "rw", "tick",
+        Fraction(1, 1),
+        "values of the waveform, one for each tick, 4096 at most; 0: nothing is added",
+    ),
+    Field(
+        "node", "excitation", "limit",
+        0x60, 16, 15, False, "rw", "",
+        Fraction(1, 1),
+        "largest |command| with it, full scale 2^15",
+    ),
+    Field(
+        "node", "excitation_value", "value",
+        0x64, 0, 16, True, "w", "",
+        Fraction(1, 1),
+        "full scale 2^15",
+    ),
+    Field(
+        "node", "excitation_value", "at",
+        0x64, 16, 12, False, "w", "",
+        Fraction(1, 1),
+        "its number",
     ),
     Field(
         "bus", "bit_time", "value",

@@ -1,0 +1,615 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The live page in Chromium, in front of the compiled firmware. Without Chromium and Playwright
+(`make chromium`) these tests are skipped.
+"""
+
+import re
+
+import pytest
+
+from figures import browser as chromium
+from moire.client import remedies
+from moire.made.bus_tables import FAULTS
+from tb.bench import ROOT
+from tb.fakes.frozen_network import FrozenNetwork
+from tb.fakes.served import Served, homed
+from tb.host.test_host_page_scope import turning
+
+AXIS = "/api/nodes/1/axes/0"
+PICTURE = ROOT / "build" / "report" / "page.png"  # docs/page.png is a copy
+SCOPE_PICTURE = PICTURE.with_name("page_scope.png")  # the same
+PATIENCE_MS = 30_000
+WIDTHS = (380, 1280, 2560)
+ESTOP = next(code for code, (name, _) in FAULTS.items() if name == "estop")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if reason := chromium.missing():
+        pytest.skip(reason)
+    with chromium.opened() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def context(browser):
+    with browser.new_context(viewport={"width": 1280, "height": 1000}, has_touch=True) as made:
+        made.set_default_timeout(PATIENCE_MS)
+        yield made
+
+
+@pytest.fixture(scope="module")
+def shared(browser):
+    """For all tests that leave a server which works."""
+    made = Served(homed())
+    yield made
+    made.end()
+
+
+@pytest.fixture
+def served(shared):
+    """The drive is off, and nothing has been asked for."""
+    with shared.http() as client:
+        client.done("POST", f"{AXIS}/disable")
+    shared.node.axes[0].causes = 0
+    shared.node.port.requests.clear()
+    shared.node.port.on_request = lambda name, fields: None
+    return shared
+
+
+def opened(context, url):
+    """The page at this address, connected."""
+    page = context.new_page()
+    page.goto(url)
+    see(page, "#link", "connected")
+    return page
+
+
+@pytest.fixture(scope="module")
+def shared_page(context, shared):
+    made, wrong = opened(context, shared.door.url), []
+    made.on("pageerror", lambda error: wrong.append(error))
+    yield made
+    made.close()
+    assert wrong == []
+
+
+@pytest.fixture
+def page(served, shared_page):
+    see(shared_page, ".axis .state", "drive off")
+    return shared_page
+
+
+def see(page, selector, text):
+    """Waits until an element has this text."""
+    page.locator(selector).filter(has_text=text).first.wait_for()
+
+
+def press(page, name):
+    page.locator(".axis").first.get_by_role("button", name=name, exact=True).click()
+
+
+def move(page, text, button="Move to"):
+    page.get_by_label("Move", exact=True).fill(text)
+    press(page, button)
+
+
+def moving(served):
+    served.wait_until(lambda: served.node.state() == "moving")
+
+
+def at_rest(served):
+    served.wait_until(lambda: served.node.state() == "holding")
+    assert served.node.ended() == "stopped" and served.node.axes[0].causes == 0
+
+
+# ------------------------------------------------------------------ an axis
+
+
+def test_an_axis_is_homed_moved_and_stepped_and_a_wrong_number_is_explained(served, page):
+    served.node.set(0, home_method=37)
+    press(page, "Home")
+    see(page, ".message", "homed: ")
+    move(page, "0.15")
+    see(page, ".message", "reached: 0.150")
+    see(page, ".position", "0.150\u2009000")
+    move(page, "−0.05", "Move by")
+    see(page, ".message", "reached: 0.100")
+    press(page, "+ step")
+    see(page, ".message", "reached: 0.110")
+    moves = served.node.executed.count("move")
+    move(page, "1,5")
+    see(page, ".message.wrong", '"1,5" is no number: write one such as 1.5')
+    move(page, "900")
+    see(page, ".message.wrong", "allowed -800um to 119.6mm")
+    see(page, ".message.wrong", remedies.CAUSES["out_of_travel"])
+    assert served.node.executed.count("move") == moves + 1  # the node refuses the second one
+    press(page, "Disable")
+    see(page, ".axis .state", "drive off")
+
+
+def test_a_fault_is_shown_with_what_to_do_and_cleared(served, page):
+    press(page, "Enable")
+    see(page, ".axis .state", "holding position")
+    served.node.axes[0].causes |= 1 << ESTOP
+    see(page, ".fault", f"Fault: emergency stop. What to do: {remedies.FAULTS['estop']}.")
+    assert page.locator(".fault").get_attribute("role") == "alert"
+    press(page, "Clear fault")
+    see(page, ".message.wrong", remedies.CAUSES["fault_persists"])
+    served.node.axes[0].causes = 0
+    press(page, "Clear fault")
+    see(page, ".axis .state", "drive off")
+    page.locator(".fault").wait_for(state="hidden")
+
+
+# ------------------------------------------------------------------ stop
+
+
+def by_the_space_bar(page):
+    page.keyboard.press(" ")
+
+
+def by_the_space_bar_in_a_field(page):
+    page.get_by_label("Move", exact=True).press(" ")
+    assert page.get_by_label("Move", exact=True).input_value() == "100"
+
+
+def by_the_space_bar_on_another_button(page):
+    page.locator(".axis").get_by_role("button", name="Home", exact=True).focus()
+    page.keyboard.press(" ")
+
+
+def by_the_button_on_top(page):
+    page.mouse.wheel(0, 5000)
+    page.locator("#stop").click()
+
+
+def by_enter_on_the_button_on_top(page):
+    page.locator("#stop").focus()
+    page.keyboard.press("Enter")
+
+
+def by_the_button_of_the_axis(page):
+    press(page, "Stop")
+
+
+def by_the_button_when_the_websocket_is_silent(page):
+    page.evaluate(
+        """() => {
+            const { send } = WebSocket.prototype;
+            WebSocket.prototype.send = () => { WebSocket.prototype.send = send; };
+        }"""
+    )
+    page.locator("#stop").click()
+
+
+@pytest.mark.parametrize(
+    "stop",
+    [
+        by_the_space_bar,
+        by_the_space_bar_in_a_field,
+        by_the_space_bar_on_another_button,
+        by_the_button_on_top,
+        by_enter_on_the_button_on_top,
+        by_the_button_of_the_axis,
+        by_the_button_when_the_websocket_is_silent,
+    ],
+)
+def test_a_motion_is_stopped(served, page, stop):
+    move(page, "100")
+    moving(served)
+    stop(page)
+    at_rest(served)
+    assert "home" not in served.node.executed
+
+
+# ------------------------------------------------------------------ hold to move
+
+
+def lifted(page, at):
+    page.mouse.up()
+
+
+def left(page, at):
+    page.mouse.move(at["x"] + at["width"] / 2, at["y"] - 60)
+
+
+def hidden(page, at):
+    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+
+
+def without_focus(page, at):
+    page.evaluate("window.dispatchEvent(new Event('blur'))")
+
+
+def stopped(page, at):
+    page.keyboard.press(" ")
+
+
+def frozen(page, at):
+    page.evaluate("setTimeout(() => { const end = Date.now() + 1500; while (Date.now() < end); })")
+
+
+@pytest.mark.parametrize("let_go", [lifted, left, hidden, without_focus, stopped, frozen])
+def test_a_held_button_moves_until_it_is_let_go(served, page, let_go):
+    button = page.get_by_role("button", name=re.compile("hold to move \\+"))
+    button.scroll_into_view_if_needed()
+    at = button.bounding_box()
+    page.mouse.move(at["x"] + at["width"] / 2, at["y"] + at["height"] / 2)
+    page.mouse.down()
+    moving(served)
+    until = served.far.now() + 0.7  # longer than a jog that nobody holds
+    served.wait_until(lambda: served.far.now() > until)
+    if served.node.state() != "moving":
+        print(
+            "DEBUG",
+            served.far.now(),
+            served.node.port.requests,
+            served.node.ended(),
+            page.locator("#link").inner_text(),
+            page.locator(".message").first.inner_text(),
+            list(map(str, served.door.bridge.present)),
+            served.gateway.arbiter.__dict__,
+            page.locator("[data-hold='+']").get_attribute("aria-pressed"),
+        )
+    assert served.node.state() == "moving"
+    let_go(page, at)
+    at_rest(served)
+    page.locator("[data-hold='+'][aria-pressed=false]").wait_for()
+    assert served.node.executed.count("move") == 1
+
+
+def test_a_finger_that_slides_off_the_button_stops_the_axis(served, page):
+    page.set_viewport_size({"width": 380, "height": 800})
+    button = page.get_by_role("button", name=re.compile("hold to move \\+"))
+    button.scroll_into_view_if_needed()
+    at = button.bounding_box()
+    point = {"x": at["x"] + at["width"] / 2, "y": at["y"] + at["height"] / 2}
+    finger = page.context.new_cdp_session(page)
+
+    def touch(kind, *points):
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
+
+    touch("touchStart", point)
+    moving(served)
+    see(page, "[data-field=owner]", "the WebSocket client")
+    assert button.bounding_box() == at  # it stays under the finger, whatever is shown
+    touch("touchMove", {**point, "y": point["y"] - 100})
+    at_rest(served)
+    touch("touchEnd")
+    page.set_viewport_size({"width": 1280, "height": 1000})
+
+
+def test_a_key_that_is_held_moves_until_it_is_lifted(served, page):
+    page.locator("[data-hold='+']").focus()
+    page.keyboard.down("Enter")
+    moving(served)
+    page.keyboard.up("Enter")
+    at_rest(served)
+
+
+def test_a_page_that_is_closed_leaves_its_axis_stopped_and_off(served, context):
+    page = opened(context, served.door.url)
+    move(page, "100")
+    moving(served)
+    page.close()
+    served.wait_until(lambda: served.node.state() == "off")
+    assert served.node.ended() == "stopped" and served.node.axes[0].causes == 0
+
+
+def test_a_network_that_is_gone_stops_a_jog(served, context):
+    network = FrozenNetwork(served.place)
+    page = opened(context, f"http://127.0.0.1:{network.port}")
+    see(page, ".axis .state", "drive off")
+    page.locator("[data-hold='+']").focus()
+    page.keyboard.down("Enter")
+    moving(served)
+    network.frozen.set()
+    at_rest(served)
+    network.close()
+    see(page, "#lost", "The server is lost")
+    assert page.locator("[data-hold='+']").get_attribute("aria-pressed") == "false"
+
+
+# ------------------------------------------------------------------ several pages, lost servers
+
+
+def test_two_pages_share_an_axis(served, page, context, monkeypatch):
+    monkeypatch.setattr("moire.web.api.REACT_S", 0)
+    other = opened(context, served.door.url)
+    move(page, "100")
+    moving(served)
+    see(other, "[data-field=owner]", "the WebSocket client at 127.0.0.1")
+    move(other, "0.01", "Move by")
+    see(other, ".message.wrong", "another client moves this axis")
+    assert served.node.executed.count("move") == 1 and served.node.state() == "moving"
+    press(other, "Take the axis over")
+    see(page, ".message", "stopped")
+    see(other, ".message", "reached: ")
+    move(page, "100")
+    moving(served)
+    other.keyboard.press(" ")
+    at_rest(served)
+    see(page, ".message", "stopped")
+
+
+def test_a_server_that_is_killed_is_shown_as_lost_and_found_again(browser, context):
+    first = Served(homed())
+    page, port = opened(context, first.door.url), first.place[1]
+    first.end()
+    see(page, "#lost", "The server is lost: what is shown is old.")
+    assert not page.locator("#stop").is_visible()
+    second = Served(homed(), port=port)
+    try:
+        see(page, "#link", "connected")
+        page.locator("#lost").wait_for(state="hidden")
+        move(page, "0.1")
+        see(page, ".message", "reached: 0.100")
+    finally:
+        page.close()
+        second.end()
+
+
+def test_a_node_that_is_switched_on_later_is_found(browser, context):
+    served = Served(homed())
+    (node,), served.far.nodes = served.far.nodes, ()
+    page = opened(context, served.door.url)
+    try:
+        page.locator("#empty").wait_for()
+        assert not page.locator("#stop").is_visible()
+        served.far.nodes = (node,)
+        served.door.bridge.absent.clear()
+        see(page, ".axis .state", "drive off")
+        assert page.locator("#stop").is_visible() and not page.locator("#empty").is_visible()
+    finally:
+        page.close()
+        served.end()
+
+
+def test_a_token_is_asked_for_and_one_that_only_reads_shows_no_controls(browser, context, tmp_path):
+    names = {"token": tmp_path / "token", "read_token": tmp_path / "reads"}
+    served = Served(homed(), **names)
+    token, reads = (path.read_text().strip() for path in names.values())
+    try:
+        page = context.new_page()
+        page.goto(served.door.url)
+        for given, said in (("wrong", "the token is wrong."), (reads, "")):
+            page.get_by_label("Token").fill(given)
+            page.keyboard.press("Enter")
+            if said:
+                see(page, "#access-text", said)
+        see(page, "#link", "connected, read only")
+        see(page, ".axis .state", "drive off")
+        assert not page.locator("#stop").is_visible()
+        assert page.locator(".axis button:visible").count() == 0
+        page.evaluate("sessionStorage.clear()")
+        page.goto(f"{served.door.url}/#token={token}")
+        page.reload()
+        see(page, "#link", "connected")
+        page.locator("#stop").wait_for()
+        assert token not in page.url
+    finally:
+        served.end()
+
+
+# ------------------------------------------------------------------ what is drawn
+
+
+def test_the_plots_and_the_parameters_show_what_the_axis_does_at_every_width(served, page):
+    move(page, "0.5", "Move by")
+    see(page, ".message", "reached")
+    page.locator(
+        "canvas[aria-label^='Position in mm over the last 30 s: axis 1.0 from']"
+    ).wait_for()
+    drawn = page.locator("#charts canvas").evaluate_all(
+        """all => all.map(one => new Set(new Uint32Array(one.getContext("2d").getImageData(
+           0, 0, one.width, one.height).data.buffer)).size)"""
+    )
+    assert len(drawn) == 4 and min(drawn) > 3
+    page.get_by_role("button", name="Read").click()
+    page.get_by_role("searchbox").fill("kp")
+    see(page, "#parameters tr:visible", "proportional gain")
+    page.get_by_label("kp, axis 1.0", exact=True).fill("0.5")
+    page.keyboard.press("Enter")
+    see(page, "#parameters .message", "kp is 0.5")
+    assert served.node.parameter("kp") == 1 << 15
+    page.get_by_label("kp, axis 1.0", exact=True).fill("many")
+    page.keyboard.press("Enter")
+    see(page, "#parameters .message.wrong", "many")
+    page.get_by_role("searchbox").fill("")
+    page.get_by_label("only what differs").check()
+    names = page.locator("#parameters tbody tr:visible th").all_inner_texts()
+    assert "kp" in names and "velocity" not in names
+    page.get_by_role("searchbox").fill("fine_")
+    for scheme in ("dark", "light"):
+        page.emulate_media(color_scheme=scheme)
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 1000})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert page.locator("#stop").is_visible()
+    page.set_viewport_size({"width": 1280, "height": 1000})
+    page.evaluate("window.scrollTo(0, 0)")
+    PICTURE.parent.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=PICTURE)
+
+
+# the samples whose place in a chart has no pixel of its colour within one pixel
+NOT_DRAWN = """async ([name, xs, values]) => {
+    const { MARGIN } = await import("/page/plot.js");
+    const canvas = document.querySelector(`canvas[data-signal="${name}"]`);
+    const { from, to, low, high } = JSON.parse(canvas.dataset.range);
+    const context = canvas.getContext("2d");
+    const scale = canvas.width / canvas.clientWidth;
+    const right = canvas.clientWidth - MARGIN.right;
+    const bottom = canvas.clientHeight - MARGIN.bottom;
+    const colour = context.strokeStyle.match(/[0-9a-f]{2}/g).map((one) => parseInt(one, 16));
+    return xs.map((_, at) => at).filter((at) => {
+        const x = MARGIN.left + (xs[at] - from) / (to - from) * (right - MARGIN.left);
+        const y = bottom - (values[at] - low) / (high - low) * (bottom - MARGIN.top);
+        const { data } = context.getImageData(
+            Math.floor(x * scale) - 1, Math.floor(y * scale) - 1, 3, 3);
+        for (let n = 0; n < data.length; n += 4) {
+            const near = colour.every((one, part) => Math.abs(one - data[n + part]) < 60);
+            if (near && data[n + 3] > 60) return false;
+        }
+        return true;
+    });
+}"""
+
+
+def written(value, digits, unit):
+    """A number as the page writes it."""
+    text = f"{abs(value):.{digits}f}"
+    sign = "" if float(text) == 0 else "+" if value > 0 else "−"
+    return f"{sign}{text} {unit}"
+
+
+def scope_of(page):
+    """The controls of the scope, with a motion as its trigger."""
+    scope = page.locator("#scope")
+    scope.locator("[name=trigger]").select_option("motion")
+    scope.locator("[name=samples]").select_option("128")
+    return scope
+
+
+def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(served, page):
+    scope = scope_of(page)
+    scope.locator("[name=share]").select_option("10")
+    scope.get_by_role("button", name="Record").click()
+    see(page, "#scope .message", "waiting for the trigger")
+    move(page, "0.3", "Move by")
+    see(page, "#scope .message", "128 samples of axis 1.0, trigger: the axis moves or homes")
+    with served.http() as client:
+        record = client.done("GET", f"{AXIS}/scope/record")
+    time_ms = [1e3 * one for one in record["time_s"]]
+    drawn = {
+        "Position": ([value / 1e6 for value in record["position_nm"]], 6, "mm"),
+        "Error": ([value / 1e3 for value in record["error_nm"]], 4, "µm"),
+        "Drive command": ([100 * value for value in record["drive_command"]], 2, "%"),
+    }
+    assert max(drawn["Position"][0]) > min(drawn["Position"][0])
+    for name, (values, _, _) in drawn.items():
+        assert page.evaluate(NOT_DRAWN, [name, time_ms, values]) == []
+    assert page.evaluate(NOT_DRAWN, ["Position", time_ms, drawn["Position"][0][::-1]]) != []
+    for a, b in ((0, record["before"]), (64, 127)):
+        scope.get_by_label("Cursor A").fill(str(a))
+        scope.get_by_label("Cursor B").fill(str(b))
+        rows = scope.locator("tbody tr").evaluate_all(
+            "all => all.map(row => [...row.cells].map(cell => cell.textContent))"
+        )
+        expected = {"Time": (time_ms, 3, "ms"), **drawn}
+        assert rows == [
+            [name, *(written(v, *how) for v in (values[a], values[b], values[b] - values[a]))]
+            for name, (values, *how) in expected.items()
+        ]
+    page.evaluate("document.querySelector('header').style.position = 'static'")
+    scope.screenshot(path=SCOPE_PICTURE)
+    page.evaluate("document.querySelector('header').style.position = ''")
+    scope.get_by_label("Cursor A").focus()
+    page.keyboard.press("ArrowRight")
+    see(page, "#scope tbody", written(time_ms[65], 3, "ms"))
+    chart = scope.locator("canvas").first
+    chart.click(position={"x": chart.bounding_box()["width"] - 9, "y": 20})
+    see(page, "#scope tbody", written(time_ms[127], 3, "ms"))
+    with page.expect_download() as download:
+        scope.get_by_role("button", name="Export CSV").click()
+    assert download.value.suggested_filename == "scope-1.0.csv"
+    assert download.value.path().read_text() == record["csv"]
+    scope.locator("[name=view]").select_option("spectrum")
+    see(page, "#scope .note", "peak amplitudes, Hann window")
+    amplitudes = [value / 1e3 for value in record["spectrum"]["error_nm"]]
+    assert page.evaluate(NOT_DRAWN, ["Error", record["frequency_hz"], amplitudes]) == []
+    see(page, "#scope figcaption", "Error, amplitude in µm over Hz")
+    box = scope.get_by_role("checkbox", name="Drive command")
+    box.focus()
+    page.keyboard.press("Enter")
+    assert scope.locator("canvas:visible").count() == 2
+    page.set_viewport_size({"width": 380, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 380
+    page.set_viewport_size({"width": 1280, "height": 1000})
+    box.check()
+
+
+def test_the_scope_has_one_owner_who_may_give_it_up_and_another_page_may_take_it(
+    served, page, context
+):
+    other = opened(context, served.door.url)
+    for one in (page, other):
+        scope_of(one).get_by_role("button", name="Record").click()
+        if one is page:
+            see(page, "#scope .message", "waiting for the trigger")
+    see(other, "#scope .message.wrong", "another client: the WebSocket client at")
+    other.get_by_role("button", name="Take the scope over").click()
+    see(other, "#scope .message", "waiting for the trigger")
+    see(page, "#scope .message.wrong", "has armed the scope")
+    other.get_by_role("button", name="Give up").click()
+    see(other, "#scope .message", "ended without a record: given up")
+    other.locator("#scope").get_by_label("One every").fill("1us")
+    other.get_by_role("button", name="Record").click()
+    see(other, "#scope .message.wrong", "samples come every 250us to 50ms")
+    other.close()
+
+
+def test_sine_and_cosine_are_drawn_with_their_ellipse_and_what_to_do(served, page):
+    signal = page.locator("#signal")
+    measure = signal.get_by_role("button", name="Measure")
+    measure.click()
+    see(page, "#signal .message", "No ellipse: too few different samples: 1 of")
+    turning(served.node)
+    see(page, "#signal .message", "ADC counts, which is good: the limits are 32 to 160")
+    signal.locator("canvas[aria-label*='samples and their ellipse']").wait_for()
+    assert "Quadrature error" in signal.locator("dl").inner_text()
+    page.set_viewport_size({"width": 380, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 380
+    page.set_viewport_size({"width": 1280, "height": 1000})
+    measure.click()
+    assert measure.get_attribute("aria-pressed") == "false"
+    turning(served.node, 20)
+    measure.click()
+    see(page, "#signal .message.wrong", "too weak: the smaller channel has")
+    see(page, "#signal .message.wrong", "What to do: clean scale and head")
+    measure.click()
+
+
+def test_the_statistics_of_the_bus_are_shown(served, page):
+    see(page, "#bus li", "the WebSocket client at 127.0.0.1")
+    with served.http() as client:
+        before = client.done("GET", "/api/bus")["repeats"]
+    spoilt = iter([[0x1FF]])
+    served.far.from_nodes = lambda word: next(spoilt, [word])
+    see(page, "#bus dl > :nth-child(2) dd", str(before + 1))
+    see(page, "#bus dd", "per s")
+    with served.http() as client:
+        found = client.done("GET", "/api/bus")
+    assert page.locator("#bus dd").nth(3).inner_text() == str(found["garbled"])
+
+
+def test_everything_that_can_be_pressed_has_a_name(page):
+    nameless = page.evaluate(
+        """[...document.querySelectorAll("button, input, select, canvas, [role=img]")]
+           .filter(one => one.offsetParent !== null)
+           .filter(one => !(one.getAttribute("aria-label") || one.labels?.length ||
+                            one.textContent.trim()))
+           .map(one => one.outerHTML)"""
+    )
+    assert nameless == []
+
+
+def test_numbers_are_written_as_people_read_them(page):
+    expected = {
+        "format.mm(-1234567)": "−1.234\u2009567",
+        "format.mm(-0.2)": "0.000\u2009000",
+        "format.signed(-0.00001, 3)": "0.000",
+        "format.signed(2, 1)": "+2.0",
+        "format.lengthOf(' −.5 ', 'um')": "-.5 um",
+        "plot.ticks(-1.2, 2.1, 4)": ["-1", "0", "1", "2"],
+        "plot.ticks(0.0499, 0.0521, 4)": ["0.050", "0.051", "0.052"],
+    }
+    found = page.evaluate(
+        f"""async () => {{
+            const format = await import("/page/format.js");
+            const plot = await import("/page/plot.js");
+            return [{", ".join(expected)}];
+        }}"""
+    )
+    assert found == list(expected.values())
