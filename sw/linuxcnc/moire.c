@@ -241,14 +241,13 @@ int rtapi_app_main(void) {
     int failed = links && count ? 0 : -1;
     if (!count) rtapi_print_msg(RTAPI_MSG_ERR, "moire: name a node: loadrt moire node=…\n");
     if (!failed) memset(links, 0, count * sizeof *links);
-    for (unsigned n = 0; n < count && !failed; n++)
-        failed = start(&links[n], n) ? export_link(&links[n], n) : -1;
-    if (failed) {
-        hal_exit(component);
-        return -1;
-    }
-    hal_ready(component);
-    return 0;
+    unsigned opened = 0;
+    for (; opened < count && !failed; opened++)
+        failed = start(&links[opened], opened) ? export_link(&links[opened], opened) : -1;
+    if (!failed) return hal_ready(component);
+    for (unsigned n = 0; n < opened; n++) carrier_close(&links[n].node.carrier);
+    hal_exit(component);
+    return -1;
 }
 
 void rtapi_app_exit(void) {

@@ -4,7 +4,6 @@ RTL and firmware, in lockstep with LinuxCNC: each packet is a servo period of th
 """
 
 import random
-import socket
 import threading
 from dataclasses import replace
 from fractions import Fraction
@@ -18,9 +17,8 @@ from experiments.s2_stage import NODE as STEPPERS
 from linuxcnc_config.generate import Configuration, load
 from linuxcnc_config.programs import Points
 from linuxcnc_config.set_up import set_up
-from moire.bus.cobs import PacketReader, sealed
+from moire.bus.link_gateway import LinkGateway
 from moire.client.bus import Bus
-from moire.made import link_tables as layout
 from moire.units import Value
 from twin import Twin, TwinTransport, build
 from twin.nodes.twin import ALL_AXES, Node
@@ -29,13 +27,10 @@ PERIOD_S = 4e-3  # a request and a reply of three axes take 2.7 ms of the slow c
 DELAY_MS = 12.0  # until a set-point: two periods, the packet, and 4 ticks
 SESSION = 0x4D1
 PARTS = 8  # of a period, at whose ends the positions are recorded
-LONGEST = 4 * layout.LONGEST_WORDS + 8
-LOST = b"?"  # instead of a reply
 SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
 SETTINGS: dict[str, Value] = {
     "watchdog_time": 0,  # of the bus, which is silent
     "home_offset": 0,
-    "ki": 0.0008,
     "travel_low": "-2mm",
     "travel_high": "150mm",
 }
@@ -62,13 +57,9 @@ class TwinMill:
         self.node, self.axes = bus.node(1), axes
         self.line = self.twin.link()
         set_up(self.node, axes, SESSION, bit_time=self.line.bit_time, watchdog_s=0)
-        self.reader = PacketReader(LONGEST)
         self.path: list[tuple[float, ...]] = []  # mm of each axis, from the index, at each part
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("127.0.0.1", 0))
-        self.socket.settimeout(0.1)
-        self.ended = threading.Event()
-        self.thread = threading.Thread(target=self.serve, daemon=True)
+        self.gateway = LinkGateway(self, PERIOD_S)
+        self.thread = threading.Thread(target=self.gateway.serve, daemon=True)
 
     def configuration(self) -> Configuration:
         """That of LinuxCNC for this twin."""
@@ -81,7 +72,7 @@ class TwinMill:
         return replace(
             found,
             bus="",
-            node=f"udp:127.0.0.1:{self.socket.getsockname()[1]}",
+            node="udp:{}:{}".format(*self.gateway.address),
             session=SESSION,
             delay_ms=DELAY_MS,
             period_ns=round(PERIOD_S * 1e9),
@@ -89,24 +80,14 @@ class TwinMill:
             simulated=True,
         )
 
-    def period(self, request: bytes) -> bytes:
-        """A servo period of the machine, with a request at its begin: the reply."""
-        self.line.send(sealed(request))
+    def exchange(self, data: bytes, seconds: float) -> bytes:
+        """The machine runs, with bytes to the node at its begin; returns those from the node."""
+        self.line.send(data)
         for _ in range(PARTS):
-            self.twin.run(PERIOD_S / PARTS)
+            self.twin.run(seconds / PARTS)
             where = (self.twin.machine(n).state.position_m * 1e3 for n in range(self.axes))
             self.path.append(tuple(where))
-        replies = list(self.reader.feed(self.line.take()))
-        return replies[-1] if replies else LOST
-
-    def serve(self) -> None:
-        """Answers requests until the end."""
-        while not self.ended.is_set():
-            try:
-                request, host = self.socket.recvfrom(LONGEST)
-            except TimeoutError:
-                continue
-            self.socket.sendto(self.period(request), host)
+        return self.line.take()
 
     def true_path(self) -> Points:
         """Rows of X, Y, Z in mm, true positions of the tables, from the indexes."""
@@ -124,7 +105,7 @@ class TwinMill:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.ended.set()
+        self.gateway.stop()
         self.thread.join()
-        self.socket.close()
+        self.gateway.socket.close()
         self.twin.close()
