@@ -37,6 +37,7 @@ RTAPI_MP_INT(simulated, "1: each packet is a servo period of a simulated node, w
 static const int64_t NS_PER_MS = 1000000;
 static const double NS = 1e-9, MS = 1e-3;
 static const int64_t SIMULATED_NS = 60000000000;  // longest wait for a simulated node
+static const int64_t CHECK_NS = 100000000;        // for a reply while the component is loaded
 enum { LEVEL_LOST = 2, LEVEL_GOOD = 1, LEVEL_LIMIT = 10 };
 enum { LEAST_TICKS = 2 };  // from one set-point to the next
 
@@ -227,7 +228,8 @@ static bool start(struct link* link, unsigned number) {
         return false;
     }
     uint32_t of = (uint32_t)session[number];
-    if (node_open(&link->node, node[number], (unsigned)axes[number], of)) return true;
+    int64_t patience = simulated ? SIMULATED_NS : CHECK_NS;
+    if (node_open(&link->node, node[number], (unsigned)axes[number], of, patience)) return true;
     rtapi_print_msg(RTAPI_MSG_ERR, "moire: %s: %s\n", node[number], link->node.why);
     return false;
 }

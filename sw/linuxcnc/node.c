@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-enum { TRIES = 20, TRY_NS = 100000000 };  // of an exchange of the check
+enum { TRIES = 20 };  // of an exchange of the check
 static const double NS = 1e-9;
 
 static bool misfit(struct node* node, const char* why) {
@@ -20,7 +20,7 @@ static bool read_register(struct node* node, uint32_t address, uint32_t* value) 
         size_t length = packet_request(&node->link, node->time, nothing, address, 0, packet);
         node->sent_at = carrier_now();
         carrier_send(&node->carrier, packet, length);
-        while ((length = carrier_receive(&node->carrier, packet, node->sent_at + TRY_NS)))
+        while ((length = carrier_receive(&node->carrier, packet, node->sent_at + node->patience)))
             if (packet_reply(&node->link, packet, length, &reply)) {
                 node->time = reply.time;
                 *value = reply.spare;
@@ -56,8 +56,10 @@ static bool check(struct node* node) {
     return true;
 }
 
-bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session) {
+bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session,
+               int64_t patience) {
     node->axes = axes;
+    node->patience = patience;
     node->link = (struct link_session){
         .session = session,
         .writes = WRITES_FIXED + axes * WRITES_EACH,

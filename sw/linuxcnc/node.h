@@ -19,15 +19,18 @@ struct node {
     struct link_session link;
     unsigned axes;
     double clk_hz;
-    double tick;      // cycles of a servo tick
-    uint32_t time;    // in the last reply, cycles
-    int64_t sent_at;  // of the request that it answers, ns
-    char why[160];    // why it cannot be used, one sentence
+    double tick;       // cycles of a servo tick
+    uint32_t time;     // in the last reply, cycles
+    int64_t sent_at;   // of the request that it answers, ns
+    int64_t patience;  // ns, with each request of the check
+    char why[160];     // why it cannot be used, one sentence
 };
 
 // Opens the carrier to a node with `axes` axes and checks that the node has this session and fits
-// the driver; false with the reason in `why`. Waits for replies: not for a realtime thread.
-bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session);
+// the driver; false with the reason in `why`. Waits for each reply for `patience` ns, several
+// times: not for a realtime thread.
+bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session,
+               int64_t patience);
 
 // The first word of a register of an axis in the lists of a node; of a register of the node, axis
 // 0.
