@@ -86,7 +86,7 @@ static void count_refused(struct link* link) {
 static void take_reply(struct link* link) {
     struct node_pins* pins = &link->pins;
     struct node* of = &link->node;
-    of->time = link->reply.time;
+    node_take_time(of, &link->reply);
     *pins->latency = (double)(carrier_now() - of->sent_at) / (double)NS_PER_MS;
     count_refused(link);
     if (link->started && link->reply.expired) *pins->watchdog_has_bit = 1;

@@ -6,6 +6,11 @@
 enum { TRIES = 20 };  // of an exchange of the check
 static const double NS = 1e-9;
 
+void node_take_time(struct node* node, const struct link_reply* reply) {
+    node->time = reply->time;
+    node->time_at = node->sent_at;
+}
+
 static bool misfit(struct node* node, const char* why) {
     snprintf(node->why, sizeof node->why, "%s", why);
     return false;
@@ -22,7 +27,7 @@ static bool read_register(struct node* node, uint32_t address, uint32_t* value) 
         carrier_send(&node->carrier, packet, length);
         while ((length = carrier_receive(&node->carrier, packet, node->sent_at + node->patience)))
             if (packet_reply(&node->link, packet, length, &reply)) {
-                node->time = reply.time;
+                node_take_time(node, &reply);
                 *value = reply.spare;
                 return true;
             }
@@ -73,6 +78,6 @@ bool node_open(struct node* node, const char* where, unsigned axes, uint32_t ses
 }
 
 uint32_t node_time(const struct node* node) {
-    double seconds = (double)(carrier_now() - node->sent_at) * NS;
+    double seconds = (double)(carrier_now() - node->time_at) * NS;
     return node->time + (uint32_t)(int64_t)(seconds * node->clk_hz);
 }
