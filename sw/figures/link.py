@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the real-time link: is a bad packet ever acted upon, how large is the hardware, and how
-fast is it with eight axes.
+"""Figures of the real-time link: is a bad packet ever acted upon, how large is the hardware, and
+how fast is it with eight axes.
 
 The bad packets go into the Verilated process_link (link_run.cpp). A packet counts as acted upon
 when it causes an access of the register bus or a reply, or when it is not counted as refused
-exactly once. The times are those of a whole simulated node at 60 MHz, whose firmware runs meanwhile.
+exactly once. The times are those of a whole simulated node of 60 MHz, with its firmware.
 """
 
 from functools import cache
@@ -59,7 +59,7 @@ def cycle_times(bit_cycles: int, cycles: int, axes: int, seed: int) -> tuple[flo
         whole, inside = [], []
         for _ in range(cycles):
             request = sealed(link.request(0, [0] * link.writes))
-            begin, packets = twin.time(), []
+            begin, packets = twin.time(), list[bytes]()
             line.send(request)
             while not packets and twin.time() - begin < LONGEST_S:
                 twin.run(STEP_S)
@@ -144,8 +144,8 @@ FIGURES = {
     "link_serial_us": Figure(
         link_serial_us,
         "us",
-        "packet in to packet out: time of a cycle without that of the bytes on the line, 8 axes (17 "
-        "words written, 32 read) at 60 MHz, the longest of 20 cycles of a simulated node",
+        "packet in to packet out: time of a cycle without that of the bytes on the line, 8 axes "
+        "(17 words written, 32 read) at 60 MHz, the longest of 20 cycles of a simulated node",
         "<= 20",
         SHORT,
         0,
@@ -153,8 +153,8 @@ FIGURES = {
     "link_usb_khz": Figure(
         link_usb_khz,
         "kHz",
-        "cycles for these 8 axes over USB-serial at 12 Mbaud, one after the other; the delays of USB "
-        "and of the host are not included",
+        "cycles for these 8 axes over USB-serial at 12 Mbaud, one after the other; the delays of "
+        "USB and of the host are not included",
         ">= 2",
         SHORT,
         2,
