@@ -35,6 +35,7 @@ DATA = ProcessData(
     writes=["axis.open_command", "axis.control", "node.start_axes"],
     reads=["axis.position", "axis.velocity", "axis.faults"],
 )
+TURNAROUND = 2  # bits from a reply to the next request
 BUS_BAUD = 1_000_000
 STEP_S = 4 / CLK_HZ  # resolution of a time
 LONGEST_S = 0.005  # a cycle
@@ -42,8 +43,8 @@ LONGEST_S = 0.005  # a cycle
 
 @cache
 def cycle_times(bit_cycles: int, cycles: int, axes: int, seed: int) -> tuple[float, float]:
-    """Longest of some cycles in seconds: from the begin of the request to the end of the reply, and
-    without the bytes on the line.
+    """Longest of some cycles in seconds: from the end of a reply to that of the next one, and that
+    without the bits on the line.
     """
     with Twin(
         [Node(1, [Axis("stepper_stage")] * axes)],
@@ -60,6 +61,7 @@ def cycle_times(bit_cycles: int, cycles: int, axes: int, seed: int) -> tuple[flo
         for _ in range(cycles):
             request = sealed(link.request(0, [0] * link.writes))
             begin, packets = twin.time(), list[bytes]()
+            twin.run(TURNAROUND * bit_cycles / CLK_HZ)
             line.send(request)
             while not packets and twin.time() - begin < LONGEST_S:
                 twin.run(STEP_S)
@@ -67,7 +69,8 @@ def cycle_times(bit_cycles: int, cycles: int, axes: int, seed: int) -> tuple[flo
             reply = link.reply(packets[0]) if packets else None
             if reply is None or any(reply.refused.values()):
                 raise MoireError(f"no good reply within {LONGEST_S} s: {reply}")
-            took, bits = twin.time() - begin, 10 * (len(request) + len(sealed(packets[0])))
+            took = twin.time() - begin
+            bits = TURNAROUND + 10 * (len(request) + len(sealed(packets[0])))
             whole.append(took)
             inside.append(took - bits * bit_cycles / CLK_HZ)
         console.print(
