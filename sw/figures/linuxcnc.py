@@ -23,7 +23,7 @@ MEDIAN_US = 10.0
 PERIODS = 100_000
 TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
 PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
-STILL_MM = 0.002  # a stepper that settles on its scale of 1 um
+STILL_MM = 0.003  # a stepper that settles on its scale of 1 um
 BLEND_MM = {"corners": 0.05}  # tolerance of its G64
 
 

@@ -132,13 +132,14 @@ class Program:
 
     def errors(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
         """Distances in mm of a path from the program while it was followed, and the path after
-        that. The path rests at the start and at the end of the program for REST rows at least, that
-        is, it moves by less than still_mm; ValueError if it does not do so in this order.
+        that. The path comes to the start, and rests at the end for REST rows at least, that is, it
+        moves by less than still_mm; ValueError if it does not do so in this order.
         """
         resting = numpy.linalg.norm(path[REST:] - path[:-REST], axis=1) < still_mm
-        began = first(resting & at(path, self.start), 0, "the start")
-        moved = first(~at(path, self.start), began, "a motion")
+        near = first(at(path, self.start), 0, "the start")
+        moved = first(~at(path, self.start), near, "a motion")
         ended = first(resting & at(path, self.place), moved, "the end")
+        began = near + int(numpy.argmin(numpy.linalg.norm(path[near:moved] - self.start, axis=1)))
         part = path[began:ended]
         distances = numpy.min([move.distances(part) for move in self.moves], axis=0)
         return distances, path[ended:]
