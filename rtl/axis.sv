@@ -62,6 +62,7 @@ module axis #(
     input wire sync,  // strobe: the sync pulse of the bus captures
     input wire estop,  // level: 1 pressed
     input wire watchdog_expired,  // level: the master of the bus is silent
+    input wire link_expired,  // level: no good packet over the link in time
     input wire cpu_stopped,  // level: the soft core has stopped or hangs
     // motion_engine: what it is given
     output logic [47:0] position,  // 2^-16 period
@@ -181,7 +182,7 @@ module axis #(
     wire moving, armed, saturated, line_up, line_down, underrun;
     wire compared, too_far, commanded;
     // interlock and drive
-    wire [11:0] faults, causes_now, first_fault;
+    wire [12:0] faults, causes_now, first_fault;
     wire signed [47:0] fault_position;
     wire downward, fine_saturated;
 
@@ -369,6 +370,7 @@ module axis #(
             .step_overrun,
             .servo_overrun,
             .sample_overrun,
+            .link_expired,
             // command
             .position,
             .valid_in        (commanded),
@@ -449,8 +451,8 @@ module axis #(
             strobes_start
         };
         wire unused_causes = &{
-            1'b0, estop, watchdog_expired, cpu_stopped, limit_low, limit_high, drive_fault,
-            encoder_fault, servo_overrun, sample_overrun, underrun, too_far
+            1'b0, estop, watchdog_expired, link_expired, cpu_stopped, limit_low, limit_high,
+            drive_fault, encoder_fault, servo_overrun, sample_overrun, underrun, too_far
         };
         wire unused_motion = &{
             1'b0, line_up, line_down, compared, commanded, servo_command, line_idle, rate_valid,

@@ -48,6 +48,7 @@ module node #(
     parameter int HAS_DISPLAY = 0,  // 1: build the numeric display
     parameter int HAS_STATUS_INPUTS = 0,  // 1: build the status inputs
     parameter int SCOPE_WORDS = 0,  // words of the recorder of ticks; 0: none, and no excitation
+    parameter int HAS_LINK = 0,  // 1: build the real-time link
     parameter int HAS_SERIAL_CORE = 0,  // 1: bit-serial soft core, with its firmware in a flash
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
     parameter FIRMWARE = "",  // file of its contents at power-up
@@ -64,6 +65,10 @@ module node #(
     input  wire               rs485_rx,             // pin, idles high
     output logic              rs485_tx,             // pin, idles high
     output logic              rs485_driver_enable,  // pin, 1: drive the bus
+    // serial line of the real-time link
+    input  wire               link_rx,              // pin, idles high
+    output logic              link_tx,              // pin, idles high
+    output logic              link_driver_enable,   // pin, 1: drive the line
     // flash of a serial core
     output logic              flash_cs_n,           // pin, low during a command
     output logic              flash_sclk,           // pin, idles low
@@ -121,17 +126,18 @@ module node #(
     localparam int LIMIT_PERIOD = CLK_HZ / 80_000;  // cycles
     localparam int SERVO_FILTERS = HAS_FILTERS % (1 << AXES) != 0 ? FILTERS : 0;
 
-    // masters of the register bus: the soft core
-    localparam int MASTERS = 1;
+    // masters of the register bus: the soft core, then the real-time link, if there is one
+    localparam int MASTERS = 1 + HAS_LINK;
     wire [MASTERS-1:0] master_request, master_ready, master_select, master_write;
     wire [16*MASTERS-1:0] master_address;
     wire [32*MASTERS-1:0] master_wdata;
+    wire [   MASTERS-1:0] master_waits = MASTERS'(core_waits || crc_waits);
     // register bus
-    wire select, write, node_select, bus_select, peripherals_select;
+    wire select, write, node_select, bus_select, peripherals_select, link_select;
     wire [AXES-1:0] axis_select, feedback_select, actuator_select;
     wire [15:0] bus_address;
     wire [31:0] wdata, wdata_low, rdata;
-    wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata;
+    wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata, link_rdata;
     wire memory_ready, stores, hold, engine_waits, core_waits, crc_waits;
     wire [13:0] stored_at;
     wire [31:0] stored_value;
@@ -186,6 +192,9 @@ module node #(
     wire signed [16:0] chain_step;
     wire               sample_overrun;
     // interlock
+    wire link_request, link_makes, link_writes, link_expired;
+    wire [15:0] link_address;
+    wire [31:0] link_wdata;
     wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
 
     if (HAS_SERIAL_CORE != 0) begin : g_serial_core
@@ -239,7 +248,7 @@ module node #(
         .rst,
         // masters
         .request   (master_request),
-        .waits     (core_waits || crc_waits),
+        .waits     (master_waits),
         .ready     (master_ready),
         .select    (master_select),
         .write     (master_write),
@@ -297,6 +306,7 @@ module node #(
         .node_rdata,
         .bus_rdata,
         .peripherals_rdata,
+        .link_rdata,
         .axis_rdata,
         .feedback_rdata,
         .actuator_rdata,
@@ -304,6 +314,7 @@ module node #(
         .node_select,
         .bus_select,
         .peripherals_select,
+        .link_select,
         .axis_select,
         .feedback_select,
         .actuator_select
@@ -581,6 +592,44 @@ module node #(
         .rs485_driver_enable
     );
 
+    link_port #(
+        .CLK_HZ(CLK_HZ),
+        .BUILT (HAS_LINK)
+    ) u_link (
+        .clk,
+        .rst,
+        // register bus, as one of its blocks
+        .select          (link_select),
+        .write,
+        .word,
+        .wdata,
+        .rdata           (link_rdata),
+        // register bus, as one of its masters
+        .request         (link_request),
+        .ready           (master_ready[MASTERS-1] && HAS_LINK != 0),
+        .link_select     (link_makes),
+        .link_write      (link_writes),
+        .link_address,
+        .link_wdata,
+        .link_rdata      (rdata),
+        // node
+        .now             (now[31:0]),
+        .watchdog_expired(link_expired),
+        // pins
+        .link_rx,
+        .link_tx,
+        .link_driver_enable
+    );
+    if (HAS_LINK != 0) begin : g_master
+        assign master_request[1] = link_request;
+        assign master_select[1] = link_makes;
+        assign master_write[1] = link_writes;
+        assign master_address[31:16] = link_address;
+        assign master_wdata[63:32] = link_wdata;
+    end else begin : g_no_master
+        wire unused_link = &{1'b0, link_request, link_makes, link_writes, link_address, link_wdata};
+    end
+
     peripherals #(
         .CLK_HZ           (CLK_HZ),
         .HAS_I2C          (HAS_I2C),
@@ -716,6 +765,7 @@ module node #(
             .sync,
             .estop,
             .watchdog_expired,
+            .link_expired,
             .cpu_stopped,
             // motion_engine: what it is given
             .position             (position[48*n+:48]),

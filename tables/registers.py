@@ -268,8 +268,8 @@ Texts = dict[str, list[str]]  # an expression: the words {kind, word} that it is
 
 @dataclass(frozen=True)
 class Layout:
-    """The words of all blocks as the register memory holds them: the blocks of the node first, then
-    those of each axis.
+    """The words of all blocks with settings that are read back, as the register memory holds them:
+    the blocks of the node first, then those of each axis.
     """
 
     alone: tuple[Block, ...]
@@ -368,8 +368,9 @@ def layout(blocks: Sequence[Block]) -> Layout:
         raise Refused(f"the blocks of one kind are {SLOT:#x} apart")
     if len(blocks) > 7:
         raise Refused("there are at most 7 kinds of blocks")
-    alone = tuple(b for b in blocks if not b.stride)
-    return Layout(alone, tuple(b for b in blocks if b.stride))
+    stored = [b for b in blocks if any(r.stored for r in b.registers)]
+    alone = tuple(b for b in stored if not b.stride)
+    return Layout(alone, tuple(b for b in stored if b.stride))
 
 
 def span(width: int, low: int = 0) -> str:
@@ -572,7 +573,7 @@ def files() -> dict[Path, str]:
         )
         for b in blocks
     }
-    for name, template in (("register_layout", "layout.sv"), ("wide_registers", "wide.sv")):
+    for name, template in (("register_layout", "layout.sv"), ("register_width", "width.sv")):
         made[ROOT / "rtl" / "registers" / f"{name}.sv"] = made_files.systemverilog(
             filled(template, layout=layout(blocks))
         )

@@ -61,11 +61,11 @@ module register_arbiter #(
         logic [        1:0] owner;  // the master whose access the bus shows
         logic [MASTERS-1:0] owns;  // the same, one bit for each
         logic accessed, answered;  // select was high one, two cycles ago
-        logic reserved;  // the last access was to a low word
+        logic         reserved;  // the last access was to a low word
         logic [H-1:0] left;  // cycles for which the bus stays reserved without a request
-        wire low;
+        wire          low;
 
-        wide_registers u_wide (
+        register_width u_wide (
             .address(bus_address[15:2]),
             .low
         );
@@ -146,17 +146,23 @@ module register_arbiter #(
             wire [1:0] turns = 2'(n < 32'(owner) ? n + MASTERS - 32'(owner) : n - 32'(owner));
             wire [1:0] of_owner = idle ? 2'd2 - 2'(reserved) :
                 answered ? 2'(reserved) : 2'(bus_select) + 2'(!bus_address[2]);
-            wire [3:0] before = owns[n] ? '0 : {1'b0, turns - 2'd1, 1'b0} + 4'(of_owner);
+            wire [3:0] to_come = owns[n] ? '0 : {1'b0, turns - 2'd1, 1'b0} + 4'(of_owner);
             wire own = select[n];
             wire mine = (accessed || answered || own) && owns[n];
             wire waiting = asks[n] && !own;
             wire other = bus_select && !own;
             always @(posedge clk) begin
-                if (!past) assume (!own);
-                else assume (own == $past(request[n] && ready[n] && !rst));
+                if (!past)
+                    assume (!own);
+                    else assume (own == $past(request[n] && ready[n] && !rst));
                 if (past && (mine || $past(request[n])))
-                    assume ($stable(write[n]) && $stable(address[16*n+:16])
-                        && $stable(wdata[32*n+:32]));
+                    assume ($stable(
+                        write[n]
+                    ) && $stable(
+                        address[16*n+:16]
+                    ) && $stable(
+                        wdata[32*n+:32]
+                    ));
                 if (accessed && owns[n]) opened <= low;
                 else if (own) opened <= 1'b0;
                 age <= own ? '0 : age + (H + 1)'(!age[H]);
@@ -179,7 +185,7 @@ module register_arbiter #(
                     if (reserved && owns[n]) assert (opened);
                     if (other) assert (!opened || dropped);
                     // the turn comes nearer with each access
-                    assert (!waiting || 32'(seen) + 32'(before) <= 2 * (MASTERS - 1));
+                    assert (!waiting || 32'(seen) + 32'(to_come) <= 2 * (MASTERS - 1));
                     assert (32'(seen) <= 2 * (MASTERS - 1));
                 end
             end

@@ -24,6 +24,7 @@ TEMPLATES = Environment(
 )
 NODE_OUTPUTS = (  # besides those of the axes
     *("rs485_tx", "rs485_driver_enable", "flash_cs_n", "flash_sclk", "flash_mosi"),
+    *("link_tx", "link_driver_enable"),
     *("i2c_scl_low", "i2c_sda_low", "keyboard_clock_low", "keyboard_data_low", "edm_clock_low"),
     *("edm_data_low", "peer_tx", "display_cs_n", "display_sclk", "display_data"),
 )
@@ -34,7 +35,7 @@ RELAY_OUTPUTS = (
 RELAY_FLASH = {"flash_cs_n": "flash_chip_n", "flash_sclk": "flash_sclk", "flash_mosi": "flash_sdo"}
 PERIPHERAL_INPUTS = {  # at the levels at which nothing happens
     **dict.fromkeys(("i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data"), "1'b1"),
-    **dict.fromkeys(("edm_clock", "edm_data", "peer_rx", "sensor_rx"), "1'b1"),
+    **dict.fromkeys(("edm_clock", "edm_data", "peer_rx", "sensor_rx", "link_rx"), "1'b1"),
     "edm_status": "2'b00",
 }
 FRONT_ENDS = "../../../docs/front_ends.md"  # from the folder of a wiring page

@@ -16,7 +16,7 @@ from tb.link.packet_receiver import PacketReceiver
 
 SESSION = 0x00BEEF
 CLK_HZ = 1_000_000
-NAMES = ("busy", "select", "write", "address", "wdata", "tx_valid", "tx_data", "tx_last")
+NAMES = ("busy", "request", "select", "write", "address", "wdata", "tx_valid", "tx_data", "tx_last")
 INPUTS = {
     "enable": 0,
     "session": SESSION,

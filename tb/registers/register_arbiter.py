@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/registers/register_arbiter.sv in integers."""
 
-from tb.registers.wide_registers import low_words
+from tb.registers.register_width import low_words
 
 LOW = low_words()
 

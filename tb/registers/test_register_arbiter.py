@@ -197,7 +197,7 @@ async def masters_that_wait_are_served_in_turn(dut):
 
 
 @cocotb.test()
-async def the_words_of_wide_registers_are_never_torn(dut):
+async def the_words_of_register_width_are_never_torn(dut):
     bench = await Bench(dut).begin()
     for master in bench.masters:
         for _ in range(60):

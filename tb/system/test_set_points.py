@@ -10,6 +10,7 @@ import pytest
 
 from moire.client.bus import Bus
 from moire.errors import Refused
+from moire.made.bus_tables import CAUSES
 from tb.bench import seed
 from tb.control.set_point_piece import piece_of, played
 from tb.control.set_point_player import signed
@@ -19,17 +20,21 @@ from twin.nodes.twin import Axis as Machine
 
 PARAMETERS = NODE | drives("HAS_BRIDGE", "HAS_STEPPER") | {"HAS_SET_POINTS": 255}
 TOP = (1 << 46, 1 << 46)  # no limits: the model of a path that was accepted
-INTERVAL = 160  # ticks, 40 ms: four writes at 115 200 baud take some 20 ms
-FIRST = 500  # ticks until the first set-point, a time for all writes
+INTERVAL = 240  # ticks, 60 ms: four writes at 115 200 baud take some 25 ms
+POINTS = 10  # intervals of a wave
+FIRST = 240  # ticks until the first set-point: at most 255 after what is queued
 STEPPER = {
     "drive": 1,
     "position_source": 2,
     "period": "5um",
     "steps_per_period": 4,
     "ki": 0,
-    "following_limit": 0,
+    "encoder_fault_mask": 0,  # it has no sine and cosine
 }
 S0_ADDRESS, STEPPER_ADDRESS = 1, 2
+
+
+CODES = {name: code for code, (name, *_) in CAUSES.items()}
 
 
 class Host:
@@ -83,7 +88,7 @@ class Host:
         self.write("node.set_point_commit", 1)
         self.points.append((tick, position, velocity))
 
-    def wave(self, n, size, count=8):
+    def wave(self, n, size, count=POINTS):
         """The set-point n of a wave, which begins and ends at rest."""
         angle = 2 * math.pi * n / count
         speed = size * 2 * math.pi / count / INTERVAL * math.sin(angle)
@@ -134,19 +139,33 @@ def host(hosts):
     hosts[S0_ADDRESS].request(enable=0, home=0, stream=0, reset_faults=0)
 
 
+def test_a_stream_needs_a_drive_that_is_on_and_an_axis_that_is_homed(host):
+    assert host.request(stream=1)["refusal"] == CODES["not_enabled"]
+    host.request(stream=0)
+    host.request(stream=0, enable=1)
+    assert host.request(stream=1)["refusal"] == CODES["not_homed"]
+    host.request(stream=0, home=1)
+    host.axis.override(0.5)
+    assert host.request(stream=1)["refusal"] == CODES["out_of_range"]
+    host.axis.override(1)
+    with pytest.raises(Refused) as why:
+        host.write("axis.stream_velocity_limit", 1)  # it is the firmware's
+    assert why.value.cause == "no_such_register"
+
+
 @pytest.mark.parametrize("address, size", [(S0_ADDRESS, 20_000), (STEPPER_ADDRESS, 40_000)])
 def test_an_axis_follows_a_streamed_wave_tick_by_tick_and_is_released_at_rest(hosts, address, size):
     host = hosts[address]
     host.begin()
     first, seen = host.read("node.tick_count") + FIRST, []
-    for n in range(9):
+    for n in range(POINTS + 1):
         host.commit(first + INTERVAL * n, *host.wave(n, size))
         if n > 2:
             while signed(host.read("node.tick_count") - first) < INTERVAL * (n - 2):
                 seen.append(host.seen())
-    while signed(host.read("node.tick_count") - first) < INTERVAL * 8 - 40:
+    while signed(host.read("node.tick_count") - first) < INTERVAL * POINTS - 40:
         seen.append(host.seen())
-    assert host.read("axis.stream_counts") == dict(accepted=9, late=0, refused=0)
+    assert host.read("axis.stream_counts") == dict(accepted=POINTS + 1, late=0, refused=0)
     path = host.targets()
     for before, target, after in seen:
         assert target in {path.get(tick) for tick in range(before, after + 1)}, (before, target)
@@ -170,7 +189,7 @@ def test_a_late_stream_stops_under_control_and_says_so(host):
     stream, status = host.read("axis.stream_state"), host.axis.status()
     assert status.ended == "set_point_late" and not status.faults
     assert (stream["ended"], stream["extrapolated"]) == (3, 40)
-    assert host.read("axis.supervision")["ended"] == 64  # the same cause, for the host
+    assert host.read("axis.supervision")["ended"] == CODES["set_point_late"]
     # it begins again only after the request has fallen
     host.twin.run(0.05)
     assert host.read("axis.stream_state")["mode"] == 0
@@ -190,8 +209,9 @@ def test_other_motions_are_refused_and_a_stop_ends_the_stream(host):
         lambda: host.axis.home(),
         lambda: host.axis.override(0.5),
     ):
-        with pytest.raises(Refused, match="busy"):
+        with pytest.raises(Refused) as why:
             refused()
+        assert why.value.cause == "busy"
     host.axis.stop()
     host.until(lambda: host.status() == "holding")
     assert host.axis.status().ended == "stopped"
@@ -209,14 +229,11 @@ def test_a_fault_ends_the_stream_and_a_host_resets_it_by_registers(host):
         host.twin.run(0.02)
         assert host.status() == "faulted" and host.read("axis.stream_state")["ended"] == 4
         assert host.axis.status().ended == "ended_by_fault"
-        assert host.request(enable=0, stream=0, reset_faults=1)["refusal"] == 10  # fault_persists
+        assert (
+            host.request(enable=0, stream=0, reset_faults=1)["refusal"] == CODES["fault_persists"]
+        )
     host.request(reset_faults=0)
-    assert host.request(reset_faults=1) == dict(state=0, homed=1, ended=17, refusal=0)
+    assert host.request(reset_faults=1) == dict(
+        state=0, homed=1, ended=CODES["ended_by_fault"], refusal=0
+    )
     host.request(reset_faults=0)
-
-
-def test_a_stream_needs_a_drive_that_is_on_and_an_axis_that_is_homed(host):
-    assert host.request(stream=1)["refusal"] == 8  # not_enabled
-    host.request(stream=0)
-    with pytest.raises(Refused, match="no_such_register"):
-        host.write("axis.stream_velocity_limit", 1)

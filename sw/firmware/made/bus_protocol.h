@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x0595CD96u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xD40D10C0u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -135,6 +135,7 @@ enum bus_fault {    // bits
     BUS_FAULT_SERVO_OVERRUN = 1 << 10,
     // a sample came before the shared interpolation chain had served the last one
     BUS_FAULT_SAMPLE_OVERRUN = 1 << 11,
+    BUS_FAULT_LINK_WATCHDOG = 1 << 12,    // no good packet came over the real-time link in time
 };
 
 enum bus_encoder_event {    // bits
@@ -415,7 +416,8 @@ enum bus_job_flag {    // bits
     X(8, "the profile ran out of segments") \
     X(9, "too many steps are pending") \
     X(10, "a servo tick came before the motion engine had served the last one") \
-    X(11, "a sample came before the shared interpolation chain had served the last one")
+    X(11, "a sample came before the shared interpolation chain had served the last one") \
+    X(12, "no good packet came over the real-time link in time")
 
 // X(code, words), up to a colon
 #define BUS_JOB_STATE_WORDS(X) \

@@ -11,11 +11,12 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x27b2ccafu  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xc94cc514u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
 #define PERIPHERALS_BASE 0x200u
+#define LINK_BASE 0x300u
 #define AXIS_BASE 0x400u
 #define AXIS_STRIDE 0x100u
 #define FEEDBACK_BASE 0xc00u
@@ -74,6 +75,12 @@ static inline void peripherals_write(uint32_t offset, uint32_t value) {
 }
 static inline uint64_t peripherals_read_wide(uint32_t offset) {
     return register_read_wide(PERIPHERALS_BASE + offset);
+}
+static inline uint32_t link_read(uint32_t offset) {
+    return register_read(LINK_BASE + offset);
+}
+static inline void link_write(uint32_t offset, uint32_t value) {
+    register_write(LINK_BASE + offset, value);
 }
 static inline uint32_t axis_read(unsigned axis, uint32_t offset) {
     return register_read(AXIS_BASE + axis * AXIS_STRIDE + offset);
@@ -655,6 +662,107 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define PERIPHERALS_EDM_STATUS_FELL_1_SHIFT 5
 #define PERIPHERALS_EDM_STATUS_FELL_1_WIDTH 1
 
+// real-time link: packets of process data, in hardware (docs/link.md)
+// w: number of the session, which the host has drawn; change it, and all below, while `enable` is 0
+#define LINK_SESSION 0x000u
+#define LINK_SESSION_MASK 0x00ffffffu
+#define LINK_SESSION_SHIFT 0
+#define LINK_SESSION_WIDTH 24
+// w: entries of the lists
+#define LINK_LISTS 0x004u
+// values that a request writes, at most 121
+#define LINK_LISTS_WRITES_MASK 0x0000007fu
+#define LINK_LISTS_WRITES_SHIFT 0
+#define LINK_LISTS_WRITES_WIDTH 7
+// values that a reply has, at most 121
+#define LINK_LISTS_READS_MASK 0x00007f00u
+#define LINK_LISTS_READS_SHIFT 8
+#define LINK_LISTS_READS_WIDTH 7
+// w: number of the entry of the lists that `entry` stores
+#define LINK_ENTRY_NUMBER 0x008u
+#define LINK_ENTRY_NUMBER_MASK 0x0000007fu
+#define LINK_ENTRY_NUMBER_SHIFT 0
+#define LINK_ENTRY_NUMBER_WIDTH 7
+// w: entry of the lists; writing stores it while the link is off and not busy
+#define LINK_ENTRY 0x00cu
+// byte address of the register that is written
+#define LINK_ENTRY_WRITE_MASK 0x0000ffffu
+#define LINK_ENTRY_WRITE_SHIFT 0
+#define LINK_ENTRY_WRITE_WIDTH 16
+// byte address of the register that is read
+#define LINK_ENTRY_READ_MASK 0xffff0000u
+#define LINK_ENTRY_READ_SHIFT 16
+#define LINK_ENTRY_READ_WIDTH 16
+// w: largest difference between the time in a request and that of the node; 0: not checked [cycle]
+#define LINK_TIME_WINDOW 0x010u
+#define LINK_TIME_WINDOW_MASK 0x00ffffffu
+#define LINK_TIME_WINDOW_SHIFT 0
+#define LINK_TIME_WINDOW_WIDTH 24
+// w: longest time without a good request while the link is on; 0: no limit [0.001 s]
+#define LINK_WATCHDOG_TIME 0x014u
+#define LINK_WATCHDOG_TIME_MASK 0x0000ffffu
+#define LINK_WATCHDOG_TIME_SHIFT 0
+#define LINK_WATCHDOG_TIME_WIDTH 16
+// w: duration of one bit of the serial line; at least 4 cycles [1/16 cycle]
+#define LINK_BIT_TIME 0x018u
+#define LINK_BIT_TIME_MASK 0x000fffffu
+#define LINK_BIT_TIME_SHIFT 0
+#define LINK_BIT_TIME_WIDTH 20
+// w: switches the link on; while it is 0, every packet is refused
+#define LINK_ENABLE 0x01cu
+#define LINK_ENABLE_MASK 0x00000001u
+#define LINK_ENABLE_SHIFT 0
+#define LINK_ENABLE_WIDTH 1
+// r: state of the link; all bits are 0 in a node without one
+#define LINK_STATE 0x020u
+// the node has a link
+#define LINK_STATE_BUILT_MASK 0x00000001u
+#define LINK_STATE_BUILT_SHIFT 0
+#define LINK_STATE_BUILT_WIDTH 1
+// the link is on
+#define LINK_STATE_ON_MASK 0x00000002u
+#define LINK_STATE_ON_SHIFT 1
+#define LINK_STATE_ON_WIDTH 1
+// a request is being played or answered
+#define LINK_STATE_BUSY_MASK 0x00000004u
+#define LINK_STATE_BUSY_SHIFT 2
+#define LINK_STATE_BUSY_WIDTH 1
+// no good request for `watchdog_time`
+#define LINK_STATE_EXPIRED_MASK 0x00000008u
+#define LINK_STATE_EXPIRED_SHIFT 3
+#define LINK_STATE_EXPIRED_WIDTH 1
+// session of the host that has switched the link on
+#define LINK_STATE_SESSION_MASK 0xffffff00u
+#define LINK_STATE_SESSION_SHIFT 8
+#define LINK_STATE_SESSION_WIDTH 24
+// r: refused packets; each count wraps at 256
+#define LINK_REFUSED 0x024u
+#define LINK_REFUSED_DAMAGED_MASK 0x000000ffu
+#define LINK_REFUSED_DAMAGED_SHIFT 0
+#define LINK_REFUSED_DAMAGED_WIDTH 8
+#define LINK_REFUSED_FOREIGN_MASK 0x0000ff00u
+#define LINK_REFUSED_FOREIGN_SHIFT 8
+#define LINK_REFUSED_FOREIGN_WIDTH 8
+#define LINK_REFUSED_WRONG_LENGTH_MASK 0x00ff0000u
+#define LINK_REFUSED_WRONG_LENGTH_SHIFT 16
+#define LINK_REFUSED_WRONG_LENGTH_WIDTH 8
+#define LINK_REFUSED_REPLAYED_MASK 0xff000000u
+#define LINK_REFUSED_REPLAYED_SHIFT 24
+#define LINK_REFUSED_REPLAYED_WIDTH 8
+// r: packets refused for their moment; each count wraps at 256
+#define LINK_REFUSED_NOW 0x028u
+#define LINK_REFUSED_NOW_OUT_OF_TIME_MASK 0x000000ffu
+#define LINK_REFUSED_NOW_OUT_OF_TIME_SHIFT 0
+#define LINK_REFUSED_NOW_OUT_OF_TIME_WIDTH 8
+#define LINK_REFUSED_NOW_BUSY_MASK 0x0000ff00u
+#define LINK_REFUSED_NOW_BUSY_SHIFT 8
+#define LINK_REFUSED_NOW_BUSY_WIDTH 8
+// rw: bytes without a stop bit; writing clears the count, which stops at its largest value
+#define LINK_FRAMING_ERRORS 0x02cu
+#define LINK_FRAMING_ERRORS_MASK 0x0000ffffu
+#define LINK_FRAMING_ERRORS_SHIFT 0
+#define LINK_FRAMING_ERRORS_WIDTH 16
+
 // axis: position, servo, profile, drive-enable interlock
 // rw: requests; the interlock decides; a field of two bits holds if both are 1, so no single
 // flipped bit switches on
@@ -778,16 +886,19 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_FAULTS_SAMPLE_OVERRUN_MASK 0x00000800u
 #define AXIS_FAULTS_SAMPLE_OVERRUN_SHIFT 11
 #define AXIS_FAULTS_SAMPLE_OVERRUN_WIDTH 1
+#define AXIS_FAULTS_LINK_WATCHDOG_MASK 0x00001000u
+#define AXIS_FAULTS_LINK_WATCHDOG_SHIFT 12
+#define AXIS_FAULTS_LINK_WATCHDOG_WIDTH 1
 // r: causes present now, same bits as faults
 #define AXIS_CAUSES_NOW 0x010u
-#define AXIS_CAUSES_NOW_MASK 0x00000fffu
+#define AXIS_CAUSES_NOW_MASK 0x00001fffu
 #define AXIS_CAUSES_NOW_SHIFT 0
-#define AXIS_CAUSES_NOW_WIDTH 12
+#define AXIS_CAUSES_NOW_WIDTH 13
 // r: cause that came first, same bits as faults; one bit
 #define AXIS_FIRST_FAULT 0x014u
-#define AXIS_FIRST_FAULT_MASK 0x00000fffu
+#define AXIS_FIRST_FAULT_MASK 0x00001fffu
 #define AXIS_FIRST_FAULT_SHIFT 0
-#define AXIS_FIRST_FAULT_WIDTH 12
+#define AXIS_FIRST_FAULT_WIDTH 13
 // r: position when the first fault was latched [1/65536 period]
 #define AXIS_FAULT_POSITION 0x018u
 #define AXIS_FAULT_POSITION_LOW 0x018u

@@ -504,6 +504,7 @@ class CompiledNode:
         self.received: deque[int] = deque()
         self.sent: list[int] = []
         self.word: dict[int, int] = {}
+        self.link: dict[int, int] = {}  # registers of the real-time link by their offsets
         self.crc_bytes = b""
         self.sequence = 0
         self.answers = (
@@ -532,6 +533,8 @@ class CompiledNode:
             if offset % d["AXIS_STRIDE"] == d["AXIS_BUILT"]:
                 return self.built
             return self.axes[axis].read(offset % d["AXIS_STRIDE"])
+        if offset >= d["LINK_BASE"]:
+            return self.link.get(offset - d["LINK_BASE"], 0)
         if offset >= d["PERIPHERALS_BASE"]:
             return self.peripherals.read(offset - d["PERIPHERALS_BASE"]) if self.peripherals else 0
         if offset >= d["BUS_BASE"]:
@@ -576,6 +579,8 @@ class CompiledNode:
             self.axes[(offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]].write(
                 offset % d["AXIS_STRIDE"], value
             )
+        elif offset >= d["LINK_BASE"]:
+            self.link[offset - d["LINK_BASE"]] = value
         elif offset >= d["PERIPHERALS_BASE"]:
             if self.peripherals:
                 self.peripherals.write(offset - d["PERIPHERALS_BASE"], value)

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x0595CD96
+PROTOCOL_CRC = 0xD40D10C0
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -143,6 +143,7 @@ FAULTS = {
     10: ("servo_overrun", "a servo tick came before the motion engine had served the last one"),
     11: ("sample_overrun",
          "a sample came before the shared interpolation chain had served the last one"),
+    12: ("link_watchdog", "no good packet came over the real-time link in time"),
 }
 
 # bit: (name, words)

@@ -6,11 +6,12 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x27B2CCAF  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xC94CC514  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
     "peripherals": (0x200, 0x000),
+    "link": (0x300, 0x000),
     "axis": (0x400, 0x100),
     "feedback": (0xC00, 0x100),
     "actuator": (0x1400, 0x100),
@@ -745,6 +746,140 @@ FIELDS = (
         "input 1 went low",
     ),
     Field(
+        "link", "session", "value",
+        0x00, 0, 24, False, "w", "",
+        Fraction(1, 1),
+        "number of the session, which the host has drawn; change it, and all below, while "
+        "`enable` is 0",
+    ),
+    Field(
+        "link", "lists", "writes",
+        0x04, 0, 7, False, "w", "",
+        Fraction(1, 1),
+        "values that a request writes, at most 121",
+    ),
+    Field(
+        "link", "lists", "reads",
+        0x04, 8, 7, False, "w", "",
+        Fraction(1, 1),
+        "values that a reply has, at most 121",
+    ),
+    Field(
+        "link", "entry_number", "value",
+        0x08, 0, 7, False, "w", "",
+        Fraction(1, 1),
+        "number of the entry of the lists that `entry` stores",
+    ),
+    Field(
+        "link", "entry", "write",
+        0x0C, 0, 16, False, "w", "",
+        Fraction(1, 1),
+        "byte address of the register that is written",
+    ),
+    Field(
+        "link", "entry", "read",
+        0x0C, 16, 16, False, "w", "",
+        Fraction(1, 1),
+        "byte address of the register that is read",
+    ),
+    Field(
+        "link", "time_window", "value",
+        0x10, 0, 24, False, "w", "cycle",
+        Fraction(1, 1),
+        "largest difference between the time in a request and that of the node; 0: not "
+        "checked",
+    ),
+    Field(
+        "link", "watchdog_time", "value",
+        0x14, 0, 16, False, "w", "s",
+        Fraction(1, 1000),
+        "longest time without a good request while the link is on; 0: no limit",
+    ),
+    Field(
+        "link", "bit_time", "value",
+        0x18, 0, 20, False, "w", "cycle",
+        Fraction(1, 16),
+        "duration of one bit of the serial line; at least 4 cycles",
+    ),
+    Field(
+        "link", "enable", "value",
+        0x1C, 0, 1, False, "w", "",
+        Fraction(1, 1),
+        "switches the link on; while it is 0, every packet is refused",
+    ),
+    Field(
+        "link", "state", "built",
+        0x20, 0, 1, False, "r", "",
+        Fraction(1, 1),
+        "the node has a link",
+    ),
+    Field(
+        "link", "state", "on",
+        0x20, 1, 1, False, "r", "",
+        Fraction(1, 1),
+        "the link is on",
+    ),
+    Field(
+        "link", "state", "busy",
+        0x20, 2, 1, False, "r", "",
+        Fraction(1, 1),
+        "a request is being played or answered",
+    ),
+    Field(
+        "link", "state", "expired",
+        0x20, 3, 1, False, "r", "",
+        Fraction(1, 1),
+        "no good request for `watchdog_time`",
+    ),
+    Field(
+        "link", "state", "session",
+        0x20, 8, 24, False, "r", "",
+        Fraction(1, 1),
+        "session of the host that has switched the link on",
+    ),
+    Field(
+        "link", "refused", "damaged",
+        0x24, 0, 8, False, "r", "",
+        Fraction(1, 1),
+        "refused packets; each count wraps at 256: damaged",
+    ),
+    Field(
+        "link", "refused", "foreign",
+        0x24, 8, 8, False, "r", "",
+        Fraction(1, 1),
+        "refused packets; each count wraps at 256: foreign",
+    ),
+    Field(
+        "link", "refused", "wrong_length",
+        0x24, 16, 8, False, "r", "",
+        Fraction(1, 1),
+        "refused packets; each count wraps at 256: wrong length",
+    ),
+    Field(
+        "link", "refused", "replayed",
+        0x24, 24, 8, False, "r", "",
+        Fraction(1, 1),
+        "refused packets; each count wraps at 256: replayed",
+    ),
+    Field(
+        "link", "refused_now", "out_of_time",
+        0x28, 0, 8, False, "r", "",
+        Fraction(1, 1),
+        "packets refused for their moment; each count wraps at 256: out of time",
+    ),
+    Field(
+        "link", "refused_now", "busy",
+        0x28, 8, 8, False, "r", "",
+        Fraction(1, 1),
+        "packets refused for their moment; each count wraps at 256: busy",
+    ),
+    Field(
+        "link", "framing_errors", "value",
+        0x2C, 0, 16, False, "rw", "",
+        Fraction(1, 1),
+        "bytes without a stop bit; writing clears the count, which stops at its largest value",
+    ),
+    Field(
         "axis", "control", "enable",
         0x00, 0, 2, False, "rw", "",
         Fraction(1, 1),
@@ -933,14 +1068,20 @@ FIELDS = (
         "latched faults: sample overrun",
     ),
     Field(
+        "axis", "faults", "link_watchdog",
+        0x0C, 12, 1, False, "r", "",
+        Fraction(1, 1),
+        "latched faults: link watchdog",
+    ),
+    Field(
         "axis", "causes_now", "value",
-        0x10, 0, 12, False, "r", "",
+        0x10, 0, 13, False, "r", "",
         Fraction(1, 1),
         "causes present now, same bits as faults",
     ),
     Field(
         "axis", "first_fault", "value",
-        0x14, 0, 12, False, "r", "",
+        0x14, 0, 13, False, "r", "",
         Fraction(1, 1),
         "cause that came first, same bits as faults; one bit",
     ),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model of rtl/registers/wide_registers.sv."""
+"""Model of rtl/registers/register_width.sv."""
 
 from moire.made.registers import BLOCKS
 from tables import registers as tables

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// wide_registers -- report whether a word of the register map is the low word of a register of 64
+// register_width -- report whether a word of the register map is the low word of a register of 64
 // bits.
 //
 // latency  0 cycles: combinational
 // rate     one word per cycle
 // source   tables/registers.rdl
-// model    tb/registers/wide_registers.py, equal for every word
+// model    tb/registers/register_width.py, equal for every word
 // made     by tables/registers.py, not to be edited
 `default_nettype none
 
-module wide_registers (
+module register_width (
     input  wire  [13:0] address,  // word of the register map
     output logic        low       // level: the word has a high word after it
 );

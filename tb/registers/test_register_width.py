@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""wide_registers: every word of the register map, and addresses without a block."""
+"""register_width: every word of the register map, and addresses without a block."""
 
 import cocotb
 from cocotb.triggers import Timer
 
 from tb.bench import run
-from tb.registers.wide_registers import low_words
+from tb.registers.register_width import low_words
 
 
 @cocotb.test()
-async def latency_is_0_and_each_word_of_the_map_is_reported_as_the_model_says(dut):
+async def latency_is_0_and_each_word_is_reported_as_the_model_says(dut):
     low = low_words()
     assert len(low) > 50 and 0x010 // 4 in low
     for address in [*range(64 * 32), *(1 << n for n in range(11, 14)), (1 << 14) - 1]:
@@ -18,5 +18,5 @@ async def latency_is_0_and_each_word_of_the_map_is_reported_as_the_model_says(du
         assert int(dut.low.value) == (address in low), f"word {address:#x}"
 
 
-def test_wide_registers():
-    run("wide_registers", __file__)
+def test_register_width():
+    run("register_width", __file__)
