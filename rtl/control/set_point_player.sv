@@ -3,8 +3,9 @@
 // the motion engine a piece of constant jerk for each set-point.
 //
 // latency   From a commit to the last word of the piece of its first axis: 336 cycles and two for
-//           each tick of the piece, if nothing else is due and the engine takes each word at once;
-//           as much again for each further axis, and the time for which the engine is busy.
+//           each tick of the piece, and 16 for a piece of one tick, if nothing else is due and the
+//           engine takes each word at once; as much again for each further axis, and the time for
+//           which the engine is busy.
 // rate      one axis after the other
 // behaviour A stream begins at rest: a piece without motion holds the target until the first
 //           set-point. Each set-point makes one piece, from the end of the last one. If a piece has
@@ -150,7 +151,9 @@ module set_point_player #(
     always_comb begin
         piece_word = '0;
         case (part)
-            2'd0: if (piece == REACH || piece == EXTEND) piece_word = 64'(end_velocity);
+            2'd0:
+            if (piece == REACH && ticks == 8'd1) piece_word = 64'(reached_velocity);
+            else if (piece == REACH || piece == EXTEND) piece_word = 64'(end_velocity);
             2'd1: if (piece == REACH) piece_word = 64'(acceleration);
             2'd2: if (piece == REACH) piece_word = 64'(jerk);
             default: piece_word = {39'd0, piece == RELEASE, 16'd0, ticks};  // bit 24: the last one
@@ -178,7 +181,7 @@ module set_point_player #(
         check_cause   = NOT_STREAMED;
         if (!is_anchored) check_cause = NOT_STREAMED;
         else if (!(|(complete & here))) check_cause = INCOMPLETE;
-        else if (distance < 32'sd2) check_cause = LATE;
+        else if (distance < 32'sd1) check_cause = LATE;
         else if (distance > 32'sd255) check_cause = TOO_FAR_AHEAD;
         else if (|(full & here)) check_cause = QUEUE_FULL;
         else check_refuses = 1'b0;

@@ -23,7 +23,7 @@ from tb.control.set_point_queue import SetPointQueue
 EXTENSION = 2  # ticks
 LAST = 1 << 24  # of the ticks of a segment
 PARTS = 4  # words of a piece
-SHORTEST, LONGEST = 2, 255  # ticks of a piece to a set-point
+SHORTEST, LONGEST = 1, 255  # ticks of a piece to a set-point
 READS = (0, 1, 4, 5, 6, 7)  # words of set_point_queue that a set-point needs
 WRAP = 1 << 32
 
@@ -166,7 +166,8 @@ class SetPointPlayer:
                     cause, goes_on, phase = LIMITS, True, "rest"
                 else:
                     acceleration, jerk, *self.reached = piece
-                    self.words = [self.ends[n][1], acceleration, jerk, self.ticks]
+                    velocity = self.reached[1] if self.ticks == 1 else self.ends[n][1]
+                    self.words = [velocity, acceleration, jerk, self.ticks]
                     phase = "offer"
         elif phase == "offer":
             if not offered:
