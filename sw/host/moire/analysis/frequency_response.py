@@ -23,6 +23,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
@@ -53,7 +54,7 @@ PEAK = "15%"  # of full scale, of the multisine
 FLATTENINGS = 300  # steps that lower its crest factor
 CUTS = 0.3, 0.9  # of the peak, in the first and in the last of these steps
 PERIODS = 2  # of a record
-RECORDS = 3
+RECORDS = 2
 SPEED_PERIODS = 0.625  # signal periods of the scale in a tick: away from all that is measured
 LEAST_COHERENCE = 0.8
 CLEAR_ERROR = 0.02  # relative standard error of a point that counts half in a fit
@@ -63,6 +64,7 @@ STARTING_S = 0.1  # until the axis moves evenly
 LEAST_SENSITIVITY = 0.1  # share of the excitation that the loop must leave
 SOFT_BANDWIDTH = 6.0  # of the slower loop, in lowest frequencies
 MOST_OF_THE_SPEED = 0.5  # that the excitation of the slower loop may take
+SAMPLES_OF_A_CYCLE = 16  # of the highest frequency, at least, where fewer samples are recorded
 SETTLING_PERIODS = 1  # of the multisine, until its response is periodic
 MODE_GAIN = 0.5  # a mode is one if it leaves less than this share of the squares
 
@@ -90,12 +92,18 @@ class Excitation:
         rms = float(numpy.sqrt(numpy.mean(self.values.astype(float) ** 2)))
         return float(numpy.abs(self.values).max()) / rms
 
-    def spectrum(self, signal: ArrayLike) -> Complex:
+    @property
+    def sparse(self) -> int:
+        """Ticks from sample to sample that suffice to record the response; a power of two."""
+        most = len(self.values) / (SAMPLES_OF_A_CYCLE * float(self.lines[-1]))
+        return max(1, 1 << int(math.log2(max(most, 1.0))))
+
+    def spectrum(self, signal: ArrayLike, every: int = 1) -> Complex:
         """The signal at the frequencies of the excitation: amplitude and phase of each period.
 
-        A row for each whole period of the signal.
+        A row for each whole period of the signal, which has a value in `every` ticks.
         """
-        rows = numpy.asarray(signal, float).reshape(-1, len(self.values))
+        rows = numpy.asarray(signal, float).reshape(-1, len(self.values) // every)
         return numpy.asarray(numpy.fft.rfft(rows, axis=1)[:, self.lines] * 2 / rows.shape[1])
 
 
@@ -203,9 +211,14 @@ def coherent_share(rows: Complex) -> Array:
 
 
 def computed(
-    excitation: Excitation, errors: ArrayLike, commands: ArrayLike, period_nm: float
+    excitation: Excitation,
+    errors: ArrayLike,
+    commands: ArrayLike,
+    period_nm: float,
+    every: int = 1,
 ) -> Response:
-    """The response, from error and command at each tick: a row for each record of whole periods.
+    """The response, from error and command at each tick, or at one in `every`: a row for each
+    record of whole periods.
 
     Error and command belong to one tick, and each record begins with the first value of the
     excitation. Raises NotTuned where the command was at its limit or the axis did not respond.
@@ -213,16 +226,16 @@ def computed(
     error_rows, command_rows = (
         numpy.atleast_2d(numpy.asarray(rows, float)) for rows in (errors, commands)
     )
-    length = len(excitation.values)
+    length = len(excitation.values) // every
     if error_rows.shape != command_rows.shape or error_rows.shape[1] % length:
         raise NotTuned(
             f"{error_rows.shape[1]} errors and {command_rows.shape[1]} commands: a record has one "
-            f"of each at every tick of whole periods of {length} ticks"
+            f"of each at every sample of whole periods of {length} samples"
         )
     if numpy.ptp(error_rows) == 0:
         raise NotTuned("no motion: the error did not change; is the drive on?")
-    y = -excitation.spectrum(level(error_rows, length))
-    u = excitation.spectrum(command_rows)
+    y = -excitation.spectrum(level(error_rows, length), every)
+    u = excitation.spectrum(command_rows, every)
     d = excitation.spectrum(excitation.values)[0]
     count = len(y)
     mean_y, mean_u = y.mean(axis=0), u.mean(axis=0)
@@ -363,7 +376,7 @@ def recorded(
 ) -> Response:
     """The response by some records, each with a motion of its own."""
     scope, length = TickScope(axis), len(excitation.values)
-    period_s = length * excitation.tick_s
+    period_s, every = length * excitation.tick_s, excitation.sparse
     scope.load(excitation.values)
     errors, commands = [], []
     for number in range(records):
@@ -373,7 +386,7 @@ def recorded(
             axis.dwell(STARTING_S)
         with scope.excited(length):
             axis.dwell(SETTLING_PERIODS * period_s)
-            scope.start(SIGNALS, PERIODS * length)
+            scope.start(SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s))
             axis.dwell((PERIODS + 1) * period_s)
         if speed_nm_s:
             axis.stop_and_wait()
@@ -384,7 +397,7 @@ def recorded(
     limit = axis.get_parameter("output_limit").counts
     if float(numpy.mean(numpy.abs(commands) >= limit)) > SATURATED:
         raise NotTuned("the command was at its limit: use a smaller peak, or a slower motion")
-    return computed(excitation, errors, commands, float(axis.period_nm))
+    return computed(excitation, errors, commands, float(axis.period_nm), every)
 
 
 # low frequencies, which the loop suppresses

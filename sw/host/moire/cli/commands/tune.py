@@ -93,9 +93,9 @@ def contradiction(given: Mapping[str, Any]) -> str | None:
 @click.option(
     "--records",
     type=click.IntRange(1, 100),
-    default=3,
+    default=2,
     metavar="N",
-    help="Number of records of the frequency response, which are averaged. The default is 3.",
+    help="Number of records of the frequency response, which are averaged. The default is 2.",
 )
 @click.option(
     "--points",
