@@ -108,7 +108,7 @@ def test_the_plant_is_measured_within_a_decibel_and_the_loop_with_it(response):
 
 def test_one_sample_in_some_ticks_suffices_for_low_frequencies():
     low = measured.multisine(TICK, 1.0, 12.0, "5%")
-    assert low.sparse == 16
+    assert low.sparse == 64
     rows = [row[:: low.sparse] for row in loop(RESONANT, SLOW, low, 2)]
     found = measured.computed(low, *rows, PERIOD_NM, low.sparse)
     beyond = numpy.abs(found.plant / RESONANT.response(found.hz) - 1)

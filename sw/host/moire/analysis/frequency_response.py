@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The measured frequency response of an axis in closed loop: plant, open loop and closed loop.
 
-    response = measure(axis, multisine(tick_s))      # the axis moves slowly and evenly meanwhile
+    response = measure(axis)                         # the axis moves slowly and evenly meanwhile
     plant = fit(response)                            # a plant of moire.analysis.tune
     Path("response.png").write_bytes(picture(response, plant, tuning))
 
@@ -46,9 +46,11 @@ from moire.client.axis import Axis
 Array = NDArray[numpy.float64]
 Complex = NDArray[numpy.complex128]
 
-PERIOD = 4096  # ticks of the multisine
+PERIOD = 4096  # ticks of the multisine of low frequencies
 LINES = 140  # frequencies of it, fewer where whole periods leave fewer
+LOW_LINES = 40  # of that of the low frequencies
 LOWEST_HZ = 1.0
+SPLIT_HZ = 20.0  # below this the multisine has its full period, above it a quarter
 HIGHEST_SHARE = 0.2  # of the tick rate
 PEAK = "15%"  # of full scale, of the multisine
 FLATTENINGS = 300  # steps that lower its crest factor
@@ -63,8 +65,8 @@ SIGNALS = ("error", "command")
 STARTING_S = 0.1  # until the axis moves evenly
 LEAST_SENSITIVITY = 0.1  # share of the excitation that the loop must leave
 SOFT_BANDWIDTH = 6.0  # of the slower loop, in lowest frequencies
-MOST_OF_THE_SPEED = 0.5  # that the excitation of the slower loop may take
-SAMPLES_OF_A_CYCLE = 16  # of the highest frequency, at least, where fewer samples are recorded
+MOST_OF_THE_SPEED = 0.3  # that the excitation of the slower loop may take
+SAMPLES_OF_A_CYCLE = 4  # of the highest frequency, at least, where fewer samples are recorded
 SETTLING_PERIODS = 1  # of the multisine, until its response is periodic
 MODE_GAIN = 0.5  # a mode is one if it leaves less than this share of the squares
 
@@ -299,23 +301,28 @@ def speed_nm_s(axis: Axis) -> float:
 
 def measure(
     axis: Axis,
-    excitation: Excitation,
+    peak: units.Value = PEAK,
     speed: units.Number | None = None,
     records: int = RECORDS,
+    low_hz: float = LOWEST_HZ,
+    high_hz: float | None = None,
     progress: Callable[[int, int], object] = lambda done, records: None,
 ) -> Response:
     """The response of an axis, which must be enabled, homed and at rest, by some records.
 
     Meanwhile the axis moves to and fro at `speed` (nm/s; None: speed_nm_s(); 0: it stays), so that
-    friction does not change its sign. The loop suppresses low frequencies of the excitation; where
-    less than LEAST_SENSITIVITY of it is left, the plant is measured again with smaller gains.
-    `progress` gets the number of records done and their number. The axis has its own gains and
-    override again at the end, and does not move. Raises NotTuned, NotRecorded, OutOfRange or
-    Refused.
+    friction does not change its sign. Frequencies above SPLIT_HZ are measured first. The loop
+    suppresses what is lower than its bandwidth: the frequencies below SPLIT_HZ, and those of which
+    it leaves less than LEAST_SENSITIVITY, are measured with smaller gains.
+    `peak` is the largest value of the multisine, a share of full scale; `progress` gets the number
+    of records done and their number. The axis has its own gains and override again at the end, and
+    does not move. Raises NotTuned, NotRecorded, OutOfRange or Refused.
     """
+    tick_s = 1 / axis.node.identity.tick_hz
+    high = multisine(tick_s, max(low_hz, SPLIT_HZ), high_hz, peak, PERIOD // 4)
     wished = speed_nm_s(axis) if speed is None else float(speed)
     tuning = in_force(axis)
-    check_room(axis, excitation, records)
+    check_room(axis, high, wished, records)
     done = 0
 
     def one_more() -> None:
@@ -324,12 +331,11 @@ def measure(
         progress(done, 2 * records)
 
     def work() -> Response:
-        response = recorded(axis, excitation, wished, records, one_more)
-        slow = numpy.abs(response.sensitivity) < LEAST_SENSITIVITY
-        if not slow.any():
+        response = recorded(axis, high, wished, records, one_more)
+        low = low_band(response, high, low_hz, wished / float(axis.period_nm) * COUNTS)
+        if low is None:
             return response
-        low = low_band(response, slow, excitation, wished / (float(axis.period_nm) / COUNTS))
-        with softened(axis, tuning, softness(response)):
+        with softened(axis, tuning, softness(response, low_hz)):
             return joined(recorded(axis, low, wished, records, one_more), response, tuning)
 
     override = axis.override()
@@ -342,10 +348,10 @@ def measure(
         axis.override(override)
 
 
-def check_room(axis: Axis, excitation: Excitation, records: int) -> None:
-    """Raises NotTuned unless the node can record so much, and the command has room for the peak."""
+def check_room(axis: Axis, excitation: Excitation, speed_nm_s: float, records: int) -> None:
+    """Raises NotTuned unless axis and node can do this, and the command has room for the peak."""
     scope, length = TickScope(axis), len(excitation.values)
-    if not axis.status().homed:
+    if speed_nm_s and not axis.status().homed:
         raise NotTuned(
             "the axis has no zero yet, so its travel is not known: home it first, or measure with "
             "--speed 0mm/s or --method steps"
@@ -409,31 +415,28 @@ def crossover_hz(response: Response) -> float:
     return float(response.hz[above[-1] if above.size else 0])
 
 
-def softness(response: Response) -> float:
-    """The factor of the gains with which the loop lets the lowest frequency through."""
-    return min(1.0, SOFT_BANDWIDTH * float(response.hz[0]) / crossover_hz(response))
+def softness(response: Response, low_hz: float) -> float:
+    """The factor of the gains with which the loop lets this frequency through."""
+    return min(1.0, SOFT_BANDWIDTH * low_hz / crossover_hz(response))
 
 
 def low_band(
-    response: Response,
-    slow: NDArray[numpy.bool_],
-    excitation: Excitation,
-    speed_lsb_s: float,
-) -> Excitation:
-    """A multisine of the frequencies that the loop suppressed. Its peak does not stop a motion."""
-    seen = ~slow if (~slow).any() else slow
-    w = 2 * math.pi * response.hz[seen]
-    velocity = float(numpy.max(numpy.abs(response.plant[seen]) * w))  # LSB/s per command
-    peak = float(numpy.abs(excitation.values).max())
+    response: Response, high: Excitation, low_hz: float, speed_lsb_s: float
+) -> Excitation | None:
+    """A multisine of the low frequencies that are not measured yet; None if there are none.
+
+    Its peak does not stop a motion.
+    """
+    slow = response.hz[numpy.abs(response.sensitivity) < LEAST_SENSITIVITY]
+    top_hz = max([SPLIT_HZ, *(slow * 1.02)])
+    if low_hz >= top_hz:
+        return None
+    at = max(0, min(len(slow), len(response.hz) - 1))
+    velocity = float(numpy.abs(response.plant[at]) * 2 * math.pi * response.hz[at])
+    peak = float(numpy.abs(high.values).max())
     if speed_lsb_s:
         peak = min(peak, MOST_OF_THE_SPEED * speed_lsb_s / velocity)
-    return multisine(
-        excitation.tick_s,
-        float(response.hz[slow][0]),
-        float(response.hz[slow][-1]) * 1.001,
-        peak / FULL_SCALE,
-        len(excitation.values),
-    )
+    return multisine(high.tick_s, low_hz, top_hz, peak / FULL_SCALE, PERIOD, LOW_LINES)
 
 
 @contextmanager
