@@ -72,8 +72,8 @@ NODE = {**drives("HAS_BRIDGE"), "FILTERS": 0}  # what the stage of S0 needs of r
 WITH_SEGMENTS = {
     **NODE,
     "SEGMENTS": 255,
-    "SCOPE_WORDS": 16384,
 }  # and with its segment table, which takes a fifteenth of the speed
+WITH_SCOPE = {**WITH_SEGMENTS, "FILTERS": 2, "SCOPE_WORDS": 16384}  # and with all to tune its servo
 BAUD = 115200
 BREAK_S = 0.003  # the line low; nodes want 2 ms
 # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
