@@ -23,6 +23,7 @@ from tb.fakes.served import Served, homed
 from tb.host.test_host_feedback import node_with_signal
 from tb.host.test_host_job import Workshop
 from tb.host.test_host_page_scope import turning
+from twin.compiled.node import PERIOD
 
 AXIS = "/api/nodes/1/axes/0"
 PICTURE = ROOT / "build" / "report" / "page.png"  # docs/page.png is a copy
@@ -623,15 +624,21 @@ def test_the_first_set_up_is_followed_step_by_step(browser, context):
         page.locator("#setup summary").focus()
         page.keyboard.press("Enter")
         see(page, "#setup [data-step=switches]", "not seen yet: low limit, high limit, emergency")
-        for number, name in enumerate(("low limit", "high limit", "emergency stop")):
-            axis.causes |= 1 << number
+        pressed = {
+            "low limit": {"low_at": axis.machine},
+            "high limit": {"low_at": axis.machine - PERIOD, "high_at": axis.machine},
+            "emergency stop": {"high_at": axis.machine + PERIOD, "causes": 1 << ESTOP},
+        }
+        for name, values in pressed.items():
+            vars(axis).update(values)
             see(page, "#setup [data-step=switches]", f"pressed now: {name}")
-            axis.causes = 0
+        vars(axis).update(causes=0, high_at=None, pressed_high=False)
+        press(page, "Clear fault")
         see(page, "#setup [data-step=switches][data-state=done]", "all were seen")
         for by, state in ((-20_000, "wrong"), (20_000, "done")):
             page.get_by_role("button", name="I am going to move it").click()
             see(page, "#setup [data-step=direction]", "move it now")
-            axis.position += by * 65536 // 800
+            axis.machine += by * PERIOD // 800
             page.locator(f"#setup [data-step=direction][data-state={state}]").wait_for()
         page.locator("#setup [data-step=signal]").get_by_role("button").click()
         see(page, "#setup [data-step=signal]", "too few different samples")
