@@ -30,6 +30,8 @@ from twin.build import ROOT
 REASONS = Path(__file__).with_name("wiring.toml")
 DESIGNS = {  # diagrams of a design; all others are in the node
     "relay": ("relay.sv", "relay_bridge.sv"),
+    "process_link": ("process_link.sv",),
+    "axis_inputs": ("axis_inputs.sv",),
     "peripherals": (
         *("peripherals.sv", "i2c_port.sv", "ps2_port.sv", "ps2_pass.sv", "peer_port.sv"),
         "angle_sensor_port.sv",
