@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure of the boards: each machine on each board that it is wired for and fits, as `make board`
-builds it.
+"""Figures of the boards: each machine on each board that it is wired for and fits, as `make board`
+builds it, and how much of two small parts the mill takes.
 """
 
 from collections.abc import Callable
+from functools import partial
 
+from boards import board as boards
 from boards import build
-from boards.fit import Design
+from boards import machine as machines
+from boards.fit import Design, fit
 from boards.generate import files
 from boards.toml_file import Misfit
 from figures.common import Figure, Quick, console, seeds
@@ -53,7 +56,39 @@ def boards_failed(places: bool = True, seed: int = 1) -> float:
     return float(failed)
 
 
+def mill_pct(board: str, packs: bool = True) -> float:
+    """Share of the LUT of a board's part that the mill takes, in percent: after packing, or by the
+    estimate of `make board`.
+    """
+    design = fit(boards.named(board), machines.named("mill"))
+    used, available = design.estimate.lut, design.board.part.lut
+    if packs:
+        build.check_tools(design)
+        folder = build.write(design)
+        build.make_firmware(design, folder)
+        found = build.counted(design, folder, build.synthesise(design, folder))
+        console.print(f"{design.name}: {build.used(design, found)}")
+        cell = found[build.placer(design).used["LUT"]]
+        used, available = cell["used"], cell["available"]
+    return 100 * used / available
+
+
+def mill(board: str, words: str, bound: str) -> Figure:
+    """The figure of the mill on a board."""
+    return Figure(
+        partial(mill_pct, board),
+        "%",
+        f"share of the LUT of {words} that the three-axis mill takes (steppers, A/B/Z scales with "
+        "index, homing, limits, firmware in block RAM), after packing by nextpnr, nothing placed",
+        bound,
+        Quick({"packs": False}, "the estimate of make board, no synthesis"),
+        1,
+    )
+
+
 FIGURES = {
+    "board_mill_i5_pct": mill("colorlight_i5", "a Colorlight i5 (LFE5U-25F)", "<= 50"),
+    "board_mill_tang_pct": mill("tang_nano_20k", "a Tang Nano 20K (GW2AR-18)", "<= 70"),
     "boards_failed": Figure(
         boards_failed,
         "builds",

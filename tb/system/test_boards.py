@@ -101,7 +101,9 @@ PINS = {  # the place of a port, and where its level and pull-up are, in each ki
 
 @pytest.mark.parametrize("design", DESIGNS, ids=lambda design: design.name)
 def test_each_port_of_the_top_has_a_pin_of_its_own(design):
-    ports = re.findall(r"^    (?:input  wire |output logic) (\w+)", generate.top(design), re.M)
+    ports = re.findall(
+        r"^    (?:input  wire |output logic|inout  wire ) (\w+)", generate.top(design), re.M
+    )
     name = design.board.part.family.constraints
     made = generate.files(design)[name]
     located, given = PINS[name]
@@ -120,7 +122,7 @@ def test_page_and_drawing_name_each_connection(design):
         assert f">{one.name}</text>" in made["wiring.svg"]
         assert f">{one.between.part}</text>" in made["wiring.svg"]
     assert made["wiring.svg"] in made["wiring.html"]
-    drawn = re.findall(r'<g class="(in|out)">', made["wiring.svg"])
+    drawn = re.findall(r'<g class="(in|out|both)">', made["wiring.svg"])
     assert drawn.count("in") == sum(one.signal.direction == "in" for one in design.connections)
     assert len(drawn) == len(design.connections)
 
@@ -165,6 +167,70 @@ def test_a_relay_has_the_coefficients_of_the_flash_and_no_firmware(tmp_path):
     assert "assign flash_mosi = node_flash_sdo;" in top and ".flash_sdi(flash_miso)" in top
     assert build.make_firmware(design, tmp_path) == "relay has no firmware"
     assert not list(tmp_path.iterdir())
+
+
+PAPERS = ("S0:", "S1:", "S2 and", "S3:", "S4: main node", "S4: sub-node")  # titles begin so
+
+
+def test_the_machine_of_each_paper_is_on_a_board():
+    titles = [design.machine.title for design in DESIGNS]
+    for paper in PAPERS:
+        assert any(title.startswith(paper) for title in titles), paper
+
+
+def test_lines_that_a_node_only_pulls_low_are_open_drain():
+    made = generate.files(fit(board.named("colorlight_i5"), machine.named("s4_main")))
+    assert "    inout  wire  i2c_scl,  // P2A 1: clock of the I2C bus\n" in made["top.sv"]
+    assert "assign i2c_scl = node_i2c_scl_low ? 1'b0 : 1'bz;" in made["top.sv"]
+    assert ".i2c_scl(i2c_scl)," in made["top.sv"]
+    assert ".edm_status({edm_alarm, edm_cutting})" in made["top.sv"]
+    assert 'IOBUF PORT "i2c_scl" PULLMODE=UP IO_TYPE=LVCMOS33' in made["pins.lpf"]
+    assert "<td>to and from the board: clock of the I2C bus</td>" in made["wiring.html"]
+
+
+def test_peripherals_that_a_machine_does_not_have_are_idle():
+    given = generate.inputs(fit(board.named("colorlight_i5"), machine.named("s4_sub")))
+    assert (given["keyboard_clock"], given["edm_status"]) == ("1'b1", "{1'b0, 1'b0}")
+    assert (given["sensor_rx"], given["peer_rx"]) == ("sensor_rx", "peer_rx")
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ('"angle_sensor"]', '"angle"]', "[node] peripherals: 'angle' is none of i2c, ps2, peer, "),
+        (
+            'peripherals = ["i2c", "peer", "angle_sensor"]',
+            'peripherals = ["i2c", "peer"]',
+            "sensor_rx is no signal of this machine, or it is in `unused`",
+        ),
+        (
+            '2.2 kilohm to 3.3 V at each line"\nvolts = 3.3',
+            '2.2 kilohm to 5 V at each line"\nvolts = 5.0',
+            "i2c_scl comes with 5 V, but J1 gp0 of constraints/ulx3s_25f/board.toml takes 3.3 V",
+        ),
+    ],
+)
+def test_wrong_peripherals_are_refused(old, new, words, tmp_path):
+    path = edited(tmp_path, "constraints/machines/s4_sub.toml", (old, new))
+    found = refusal(lambda: fit(board.named("ulx3s_25f"), machine.load(path)))
+    assert found.startswith(f"{path}: ") and words in found
+
+
+def test_an_open_drain_line_needs_a_pin_for_both_directions(tmp_path):
+    path = edited(
+        tmp_path,
+        "constraints/machines/s4_sub.toml",
+        ("[wiring.ulx3s]", "[wiring.tang_nano_20k]"),
+        ('i2c_scl = "J1 gp0"', 'i2c_scl = "LED 15"'),
+    )
+    pins = (f'"J5 {pin}"' for pin in (76, 42, 41, 56, 54, 51, 48, 55, 49, 86, 79, 72))
+    text = re.sub(r'"J[12] g[pn]\d+"', lambda _: next(pins), path.read_text())
+    path.write_text(text)
+    found = refusal(lambda: fit(board.named("tang_nano_20k"), machine.load(path)))
+    assert found == (
+        f"{path}: i2c_scl is an input and output, but LED 15 of "
+        "constraints/tang_nano_20k/board.toml is an output only"
+    )
 
 
 def test_signals_that_a_layout_leaves_out_are_on_its_page():
@@ -329,6 +395,7 @@ def test_the_costs_of_features_are_those_that_the_page_lists():
     for name, lut in size.FEATURES.items():
         assert int(rows[words.get(name, name)]) == lut, name
     assert int(rows["step generator"]) == size.STEPPER
+    assert f"take {size.PERIPHERALS} LUT4" in (ROOT / "docs" / "peripherals.md").read_text()
     assert str(size.STEP_NODE) in rows.values() and str(size.SINE_NODE) in rows.values()
     assert str(size.STEP_AXIS) in rows.values() and str(size.SINE_AXIS) in rows.values()
 
