@@ -13,6 +13,7 @@ from boards import block_ram
 from boards.board import FLASH, LEDS, Pad
 from boards.fit import PLACEHOLDER, Connection, Design
 from boards.machine import AXIS_SIGNALS, NODE_SIGNALS, PERIPHERALS, RELAY_SIGNALS
+from moire.analysis.loopback import GROUND, PLUG
 
 TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).with_name("templates")),
@@ -233,6 +234,19 @@ def unconnected(design: Design) -> list[str]:
     return [*machine.unused, *machine.wiring[design.board.layout].unused, *of_axes]
 
 
+def plug(design: Design) -> list[tuple[str, str]]:
+    """(from, to) of the wires of the loop-back plug, at pins of the board; none without drives."""
+    places = {one.name: one.pad.place for one in design.connections}
+    found = [(GROUND, places["estop_open"])] if "estop_open" in places else []
+    for axis in design.machine.axes:
+        for name, source in PLUG.items():
+            start = source if source == GROUND else places.get(f"{axis.name}.{source}")
+            end = places.get(f"{axis.name}.{name}")
+            if axis.drives and start and end:
+                found.append((start, end))
+    return found
+
+
 def page(design: Design) -> str:
     """The wiring page."""
     return TEMPLATES.get_template("wiring.html.jinja").render(
@@ -240,6 +254,7 @@ def page(design: Design) -> str:
         svg=Markup(svg(design)),
         connections=design.connections,
         unconnected=unconnected(design),
+        plug=plug(design),
         front_ends=FRONT_ENDS,
         level=level,
     )

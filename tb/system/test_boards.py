@@ -21,6 +21,7 @@ from amaranth_boards.ulx3s import ULX3S_25F_Platform, ULX3S_85F_Platform
 from boards import board, build, clocks, generate, machine, size
 from boards.fit import fit
 from boards.toml_file import Misfit
+from figures import boards as figures_of_boards
 from figures import synthesis
 from figures.boards import boards_failed
 from figures.synthesis import SynthesisError
@@ -233,6 +234,20 @@ def test_an_open_drain_line_needs_a_pin_for_both_directions(tmp_path):
     )
 
 
+def test_the_page_describes_the_loop_back_plug_of_axes_with_drives():
+    mill = fit(board.named("ulx3s_85f"), machine.named("mill"))
+    wires = generate.plug(mill)
+    assert wires[0] == ("GND", "J2 gn20") and len(wires) == 1 + 3 * 5
+    assert ("J1 gn3", "J1 gp0") in wires and ("J1 gp3", "J1 gp1") in wires
+    page = generate.files(mill)["wiring.html"]
+    assert "<tr><td>J1 gn3</td><td>J1 gp0</td></tr>" in page
+    s3 = fit(board.named("colorlight_i5"), machine.named("s3"))
+    assert {start for start, _ in generate.plug(s3)} == {"GND", "P3A 1"}
+    box = fit(board.named("icebreaker"), machine.named("counter_box"))
+    assert not generate.plug(box)
+    assert "Loop-back" not in generate.files(box)["wiring.html"]
+
+
 def test_signals_that_a_layout_leaves_out_are_on_its_page():
     made = generate.files(fit(board.named("tang_nano_20k"), machine.named("mill")))
     assert "rs485_rx, rs485_tx, rs485_driver_enable, X.probe_0" in made["wiring.html"]
@@ -337,6 +352,10 @@ def no_way(*_):
     raise SynthesisError("no way")
 
 
+def no_more(*_):
+    raise AssertionError("it is placed again")
+
+
 @pytest.mark.parametrize(
     "place, failed",
     [
@@ -346,7 +365,7 @@ def no_way(*_):
     ],
 )
 def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
-    place, failed, monkeypatch
+    place, failed, monkeypatch, tmp_path
 ):
     """Of four builds: one reaches 18 MHz but not 48 or 27, one needs no placement."""
     names = ("icebreaker", "ice40_hx8k_evn", "tang_nano_9k", "arty_a7_35t")
@@ -355,7 +374,13 @@ def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
     for name in ("check_tools", "write", "make_firmware", "synthesise", "pack"):
         monkeypatch.setattr(build, name, lambda *_: Path("none"))
     monkeypatch.setattr(build, "place", place)
+    monkeypatch.setattr(figures_of_boards, "RESULTS", tmp_path)
     assert boards_failed() == failed
+    monkeypatch.setattr(build, "place", no_more)  # each placement was kept
+    assert boards_failed() == failed
+    monkeypatch.setattr(build, "state", lambda design: design.name)  # something has changed
+    with pytest.raises(AssertionError):
+        boards_failed()
 
 
 # Clocks and sizes

@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands that find what is wrong: fault, selftest."""
 
+from itertools import chain
+
+import click
+
 from moire import units
+from moire.analysis import loopback
 from moire.analysis import selftest as checks
 from moire.cli.commands.axis import table
 from moire.cli.parser import moire
 from moire.cli.session import Call
+from moire.cli.values import Name
 from moire.client import remedies
 from moire.client.records import Signal
+
+WALKS = {"open": loopback.open_checks, "plug": loopback.plug_checks}  # of the pins, by --pins
 
 
 @moire.command(
@@ -47,13 +55,26 @@ def fault(call: Call) -> None:
 
 @moire.command(
     "selftest",
-    help="Check a node without moving anything.",
+    help="Check a node without moving anything, or its pins without a machine.",
     example="moire --port /dev/ttyUSB0 selftest",
 )
-def selftest(call: Call) -> None:
+@click.option(
+    "--pins",
+    type=Name("check of the pins", WALKS),
+    metavar="CHECK",
+    help="Check the pins of the axes instead, with the machine taken off: 'open' checks that "
+    "inputs without a wire read as pressed; 'plug' switches the drives on and steps, through the "
+    "loop-back plug that the wiring page describes.",
+)
+def selftest(call: Call, pins: str | None) -> None:
     """Every check is made, even if one has failed."""
     found, address = [], call.options.address
-    for check in checks.checks(call.node):
+    made = (
+        chain(checks.node_checks(call.node), WALKS[pins](call.node))
+        if pins
+        else checks.checks(call.node)
+    )
+    for check in made:
         found.append(check)
         if not call.options.json:
             result = "passed" if check.passed else "FAILED"
