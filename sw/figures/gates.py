@@ -12,8 +12,10 @@ import random
 from collections.abc import Callable, Mapping, Sequence
 
 from boards import board as boards
+from boards import build as boards_build
 from boards import machine as machines
 from boards.fit import Design, fit
+from boards.size import firmware_stem
 from experiments.s3_zero import CLK_HZ, COUNT_M, SETTINGS, Motor
 from figures.common import Figure, Quick, console
 from figures.synthesis import SynthesisError, elaborated, source_of
@@ -21,13 +23,14 @@ from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport, build
 from twin.netlist import NetlistError
-from twin.nodes.twin import BAUD, Axis, Node
+from twin.nodes.twin import Axis, Node
 
 BY_TWIN = ("CLK_HZ", "AXES", "FIRMWARE")  # parameters of the node that the twin sets itself
 TARGET_MM = 0.5
 NEAR_UM = 2.0  # two counts of the scale
-BOX_HZ, BOX_BAUD = 5_000_000, 28_800  # both a quarter of those of the counter box at 20 MHz
+BOX_HZ = 5_000_000
 BOX_START_S = 0.3  # until its serial core has read its firmware and listens
+BOX_ANSWER_S = 0.5  # its answers take four times as long as at 20 MHz
 STEP_S, LONGEST_S = 5e-3, 2.0  # of motion by hand
 
 
@@ -36,16 +39,16 @@ def parameters(design: Design) -> dict[str, int | str]:
     return {name: value for name, value in design.parameters.items() if name not in BY_TWIN}
 
 
-def twin_of(design: Design, nodes: Sequence[Node], seed: int, clk_hz: int, baud: float) -> Twin:
+def twin_of(design: Design, nodes: Sequence[Node], seed: int, clk_hz: int) -> Twin:
     """Nodes that are the netlist of a design, with its firmware."""
-    machine, part = design.machine, design.board.part
+    part, folder = design.board.part, boards_build.write(design)
+    boards_build.make_firmware(design, folder)
     return Twin(
         nodes,
         seed=seed,
         clk_hz=clk_hz,
-        baud=baud,
         node_parameters=parameters(design),
-        firmware=build.firmware(machine.image, len(machine.axes), machine.core, machine.update),
+        firmware=build.words_of(folder / f"{firmware_stem(design.machine)}.hex"),
         netlist=f"{part.family.name} {part.synthesis}".strip(),
     )
 
@@ -58,7 +61,7 @@ class GateMotor(Motor):
         super().__init__(seed)
 
     def twin_of(self, nodes: Sequence[Node], seed: int) -> Twin:
-        return twin_of(self.design, nodes, seed, CLK_HZ, BAUD)
+        return twin_of(self.design, nodes, seed, CLK_HZ)
 
 
 def homes_and_moves(design: Design, seed: int) -> str:
@@ -82,9 +85,12 @@ class Box:
 
     def __init__(self, design: Design, seed: int) -> None:
         nodes = [Node(1, [Axis("linear_motor")] * len(design.machine.axes))]
-        self.twin = twin_of(design, nodes, seed, BOX_HZ, BOX_BAUD)
+        self.twin = twin_of(design, nodes, seed, BOX_HZ)
         self.twin.run(BOX_START_S)
-        self.axis = Bus(TwinTransport(self.twin), random_source=random.Random(seed)).axis(1)
+        source = random.Random(seed)
+        self.axis = Bus(TwinTransport(self.twin), answer_s=BOX_ANSWER_S, random_source=source).axis(
+            1
+        )
         for name in ("deglitch", "period", "counts_per_period"):
             self.axis.set_parameter(name, SETTINGS[name])
 
