@@ -25,6 +25,7 @@ TEMPLATES = Environment(
 )
 NODE_OUTPUTS = (  # besides those of the axes
     *("rs485_tx", "rs485_driver_enable", "flash_cs_n", "flash_sclk", "flash_mosi"),
+    *("link_tx", "link_driver_enable"),
     *("i2c_scl_low", "i2c_sda_low", "keyboard_clock_low", "keyboard_data_low", "edm_clock_low"),
     *("edm_data_low", "peer_tx", "display_cs_n", "display_sclk", "display_data"),
 )

@@ -35,6 +35,7 @@ PERIPHERALS = {  # of a node: its parameter of rtl/node.sv
     "angle_sensor": "HAS_ANGLE_SENSOR",
     "display": "HAS_DISPLAY",
     "status_inputs": "HAS_STATUS_INPUTS",
+    "link": "HAS_LINK",
 }
 FEATURES = {  # of an axis: its parameter of rtl/node.sv, and the feature that it needs
     "sine": ("HAS_SINE", ""),
@@ -78,6 +79,9 @@ NODE_SIGNALS = {
     "rs485_tx": Signal("out", "rs485", "driver of the bus, idles high"),
     "rs485_driver_enable": Signal("out", "rs485", "1: drive the bus"),
     "estop_open": Signal("in", "estop", "1: emergency stop pressed or wire cut", needs="drive"),
+    "link_rx": Signal("in", "link", "line of the real-time link, idles high", 1, "link"),
+    "link_tx": Signal("out", "link", "line of the real-time link, idles high", needs="link"),
+    "link_driver_enable": Signal("out", "link", "1: drive the line", needs="link"),
     "i2c_scl": Signal("both", "i2c", "clock of the I2C bus", 1, "i2c"),
     "i2c_sda": Signal("both", "i2c", "data of the I2C bus", 1, "i2c"),
     "keyboard_clock": Signal("both", "keyboard", "clock of the keyboard", 1, "ps2"),
@@ -210,6 +214,7 @@ def axis_of(table: Table) -> Axis:
         table.chosen("features", FEATURES),
         table.chosen("unused", AXIS_SIGNALS),
     )
+    table.left.pop("linuxcnc", None)  # what linuxcnc_config reads
     table.close()
     if not axis.name.isidentifier():
         raise table.misfit(f"name {axis.name!r} must consist of letters, digits and _")
@@ -310,6 +315,7 @@ def load(path: Path) -> Machine:
     """The machine of a machine file."""
     table = read(path)
     title, between = table.take("title", str), between_of(table.table("between"))
+    table.left.pop("linuxcnc", None)  # what linuxcnc_config reads
     layouts = table.table("wiring")
     if {"node", "relay"} <= set(table.left):
         raise table.misfit("a machine has [node] or [relay], not both")

@@ -73,12 +73,14 @@ WITH_SEGMENTS = {
     **NODE,
     "SEGMENTS": 255,
 }  # and with its segment table, which takes a fifteenth of the speed
+WITH_SCOPE = {**WITH_SEGMENTS, "FILTERS": 2, "SCOPE_WORDS": 16384}  # and with all to tune its servo
 BAUD = 115200
 BREAK_S = 0.003  # the line low; nodes want 2 ms
 # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
 TURNAROUND_CELLS = 2
 CELLS = 11  # of a character: start, eight data, 9th, stop
 PEER_BAUD = 9600  # between nodes
+LINK_BIT_CYCLES = 5  # of the real-time link
 ALL_PERIPHERALS = dict.fromkeys(PERIPHERALS, 1)
 CUTS = {"none": 0, "idle": 1, "break": 2}
 
@@ -102,6 +104,7 @@ FUNCTIONS: Functions = {
     "twin_machine": (HANDLE, [HANDLE, WHOLE]),
     "twin_attach_devices": (HANDLE, [HANDLE, WHOLE, HANDLE, ctypes.c_uint, LONG, WHOLE]),
     "twin_join_peers": (HANDLE, [HANDLE, WHOLE, WHOLE, LONG, REAL]),
+    "twin_join_link": (None, [HANDLE, WHOLE, LONG, REAL, HANDLE]),
     "twin_power": (None, [HANDLE, WHOLE, WHOLE]),
     "twin_register": (ctypes.c_char_p, [WHOLE, HANDLE]),
     "twin_flip_at": (None, [HANDLE, LONG, WHOLE, WHOLE, WHOLE, WHOLE]),
@@ -155,6 +158,35 @@ class BusState:
     edges: int
     last_driven_s: float
     words_waiting: int
+
+
+class LinkLine:
+    """The host's end of the serial line of a real-time link: bytes, in the time of the machine.
+
+    A bit takes LINK_BIT_CYCLES cycles, as 12 Mbaud at 60 MHz.
+    """
+
+    def __init__(self, twin: "Twin", to_node: PeerLineHandle, to_host: PeerLineHandle) -> None:
+        self.twin, self.to_node, self.to_host = twin, to_node, to_host
+
+    @property
+    def bit_time(self) -> int:
+        """The bit time of the line for the register link.bit_time, in 1/16 cycle."""
+        return 16 * LINK_BIT_CYCLES
+
+    def send(self, data: bytes) -> None:
+        """Begins to send bytes to the node; no time passes."""
+        self.to_node.put(data)
+
+    def take(self) -> bytes:
+        """The bytes that have come from the node since the last call; no time passes."""
+        return self.to_host.take_received()
+
+    def exchange(self, data: bytes, seconds: float) -> bytes:
+        """Sends bytes, lets so much time pass, and returns what came from the node until then."""
+        self.send(data)
+        self.twin.run(seconds)
+        return self.take()
 
 
 def library(
@@ -279,6 +311,7 @@ class Twin:
             )
             for pair in pairs
         }
+        self.seed, self.now, self.links = seed, now, dict[int, LinkLine]()
         if host_baud_error:
             self.set_host_baud(baud * (1 + host_baud_error))
 
@@ -466,6 +499,20 @@ class Twin:
         if (sender, receiver) not in self.peer_lines:
             raise LookupError(f"no serial line leads from node {sender} to node {receiver}")
         return self.peer_lines[sender, receiver]
+
+    # real-time link
+
+    def link(self, node: int = 0) -> "LinkLine":
+        """The host's end of the real-time link of a node that was built with HAS_LINK."""
+        if self.check_node(node) not in self.links:
+            lines = (ctypes.c_void_p * 2)()
+            baud = self.clk_hz / LINK_BIT_CYCLES
+            self.library.twin_join_link(
+                self.handle, node, self.seed, baud, ctypes.addressof(lines)
+            )
+            ends = [PeerLineHandle(self.library, int(line or 0), self.now) for line in lines]
+            self.links[node] = LinkLine(self, *ends)
+        return self.links[node]
 
     # power
 

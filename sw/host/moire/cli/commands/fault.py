@@ -15,16 +15,29 @@ from moire.cli.values import Name
 from moire.client import remedies
 from moire.client.records import Signal
 
+NAMES = sorted({name for remedies_of, _ in remedies.TABLES.values() for name in remedies_of})
 WALKS = {"open": loopback.open_checks, "plug": loopback.plug_checks}  # of the pins, by --pins
 
 
 @moire.command(
     "fault",
-    help="Show the latched faults, which of them came first and where, and what to do.",
+    help="Show the latched faults, which of them came first and where, and what to do; or explain "
+    "a fault or a cause by its name.",
     example="moire --port /dev/ttyUSB0 fault -- reset",
 )
-def fault(call: Call) -> None:
-    """Clears nothing."""
+@click.argument(
+    "name",
+    required=False,
+    type=Name("fault or cause", NAMES, "fault --help"),
+    metavar="NAME",
+    help="The name of a fault, a cause or an event of the encoder, such as following_error. "
+    "docs/faults.md lists them.",
+)
+def fault(call: Call, name: str | None) -> None:
+    """Clears nothing, and opens no port for an explanation."""
+    if name is not None:
+        explain(call, name)
+        return
     axis = call.axis
     status, encoder = axis.status(), axis.encoder()
     signal = axis.signal() if axis.built().has("monitor") else Signal((), ())
@@ -51,6 +64,20 @@ def fault(call: Call) -> None:
     to_do = remedies.of_faults(status.first_fault or status.faults)
     rows.append(("to do", f"{to_do}; then 'moire reset'{home}"))
     call.say_of_axis(values, table(f"{call.where}: {status.fault_words}", rows, 9))
+
+
+def explain(call: Call, name: str) -> None:
+    """Print what a name means, what to check, and the parameters that matter."""
+    found = remedies.explained(name)
+    parameters = remedies.parameters_in(" ".join(to_do for _, _, to_do in found))
+    rows = []
+    for what, meaning, to_do in found:
+        rows += [f"{name}, a {what}".replace("a event", "an event")]
+        rows += [f"  {'means':<12}{meaning}", f"  {'to do':<12}{to_do}"]
+    if parameters:
+        rows.append(f"  {'parameters':<12}{', '.join(parameters)}")
+    entries = [{"kind": what, "words": meaning, "to_do": to_do} for what, meaning, to_do in found]
+    call.say({"name": name, "found": entries, "parameters": parameters}, "\n".join(rows))
 
 
 @moire.command(
