@@ -88,10 +88,8 @@ class Box:
         nodes = [Node(1, [Axis("linear_motor")] * len(design.machine.axes))]
         self.twin = twin_of(design, nodes, seed, BOX_HZ)
         self.twin.run(BOX_START_S)
-        source = random.Random(seed)
-        self.axis = Bus(TwinTransport(self.twin), answer_s=BOX_ANSWER_S, random_source=source).axis(
-            1
-        )
+        port, source = TwinTransport(self.twin), random.Random(seed)
+        self.axis = Bus(port, answer_s=BOX_ANSWER_S, random_source=source).axis(1)
         for name in ("deglitch", "period", "counts_per_period"):
             self.axis.set_parameter(name, SETTINGS[name])
 
