@@ -242,6 +242,11 @@ def check_part(board: Board, machine: Machine, needed: size.Size) -> None:
         reader = "relay" if machine.orders else "serial core"
         if missing := [name for name in FLASH if name not in board.on_board]:
             raise Misfit(f"{machine.file}: a {reader} needs {missing[0]}, {board.file} has none")
+    if machine.core == "serial" and not part.family.appendable:
+        raise Misfit(
+            f"{machine.file}: a serial core has its firmware behind the bitstream, which is a text "
+            f"for {part.name} of {board.file}"
+        )
     cycles = board.node_hz // TICK_HZ
     if (taken := size.tick_cycles(machine)) > cycles:
         raise Misfit(

@@ -733,6 +733,22 @@ def test_a_relay_on_a_board_without_flash_is_refused(tmp_path):
     assert found == f"{path}: a relay needs flash_cs_n, {arty} has none"
 
 
+def test_a_serial_core_on_a_part_whose_bitstream_is_a_text_is_refused(tmp_path):
+    connectors = board.named("tang_nano_20k").connectors
+    places = (f"{name} {pin}" for name in ("J5", "J6") for pin in connectors[name])
+    path = edited(
+        tmp_path,
+        "constraints/machines/counter_box.toml",
+        ("[wiring.icebreaker]", "[wiring.tang_nano_20k]"),
+    )
+    path.write_text(re.sub(r'"PMOD\w+ \d+"', lambda _: f'"{next(places)}"', path.read_text()))
+    tang = "constraints/tang_nano_20k/board.toml"
+    assert refusal(lambda: fit(board.named("tang_nano_20k"), machine.load(path))) == (
+        f"{path}: a serial core has its firmware behind the bitstream, which is a text for "
+        f"GW2AR-18C of {tang}"
+    )
+
+
 def test_a_relay_on_a_smaller_part_is_refused(tmp_path):
     path = edited(tmp_path, "constraints/icebreaker/board.toml", ("lut = 5280", "lut = 3520"))
     found = refusal(lambda: fit(board.load(path), machine.named("relay")))
