@@ -343,7 +343,9 @@ def measure(
         if wished:
             velocity = axis.get_parameter("velocity").counts * float(axis.period_nm)  # nm/s
             axis.override(min(1.0, wished / velocity))
-        return check(axis.stopping_on_error(work))
+        response = axis.stopping_on_error(work)
+        axis.dwell(STARTING_S)  # it comes to rest with its own gains
+        return check(response)
     finally:
         axis.override(override)
 
@@ -498,12 +500,12 @@ class MeasuredPlant(Plant):
 
 def modelled(values: Array, tick_s: float, has_mode: bool) -> Plant:
     """The plant of the parameters of a fit: the logarithms of its time constant in ticks, gain,
-    ticks of delay, and of frequency and damping of the mode.
+    ticks of delay, second time constant in ticks, and of frequency and damping of the mode.
     """
-    time, gain, late = (float(value) for value in numpy.exp(values[:3]))
+    time, gain, late, second = (float(value) for value in numpy.exp(values[:4]))
     a = math.exp(-1 / max(time, 0.05))
     whole = int(late)
-    mode = (float(math.exp(values[3])), float(math.exp(values[4]))) if has_mode else (None, None)
+    mode = (float(math.exp(values[4])), float(math.exp(values[5]))) if has_mode else (None, None)
     return Plant(
         a=a,
         b=gain * (1 - a),
@@ -512,6 +514,7 @@ def modelled(values: Array, tick_s: float, has_mode: bool) -> Plant:
         resonance_hz=mode[0],
         part=late - whole,
         damping=mode[1],
+        lag=math.exp(-1 / max(second, 0.05)),
     )
 
 
@@ -536,7 +539,7 @@ def fit(response: Response) -> MeasuredPlant:
 
     w = 2 * math.pi * hz * response.tick_s
     rigid = [
-        [time, float(numpy.median(numpy.abs(points) * w * numpy.hypot(1, w * time))), late]
+        [time, float(numpy.median(numpy.abs(points) * w * numpy.hypot(1, w * time))), late, 0.5]
         for time in (4.0, 40.0, 400.0)
         for late in (0.5, 1.5, 3.5)
     ]
@@ -544,8 +547,14 @@ def fit(response: Response) -> MeasuredPlant:
     beyond = numpy.abs(points / modelled(values, response.tick_s, False).response(hz))
     upper = hz > hz[0] * 10
     peak_hz = float(hz[upper][beyond[upper].argmax()]) if upper.any() else float(hz[-1])
+    time, gain, late, _ = numpy.exp(values)
     with_mode, left_with_mode = best(
-        [[*numpy.exp(values), peak_hz, damping] for damping in (0.01, 0.05, 0.2)], True
+        [
+            [time, gain, max(0.3, late - second), second, peak_hz, damping]
+            for second in (0.1, 1.0)
+            for damping in (0.01, 0.05, 0.2)
+        ],
+        True,
     )
     has_mode = bool(left_with_mode @ left_with_mode < MODE_GAIN * (left @ left))
     if has_mode:
