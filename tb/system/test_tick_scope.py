@@ -41,11 +41,9 @@ def test_a_move_is_recorded_at_each_tick_with_every_signal(axis):
     status = axis.move("20um")
     values = scope.read().values
     assert {len(signal) for signal in values.values()} == {300}
-    moved = numpy.diff(values["target"])
-    # the velocity of the target is that of the tick, in whole LSB
-    assert numpy.abs(moved[1:] - values["target_velocity"][1:-1]).max() <= 2 or (
-        numpy.abs(moved[:-1] - values["target_velocity"][1:-1]).max() <= 2
-    )
+    # the target moves by its velocity at every tick; the first time it begins at the position
+    beyond = numpy.abs(numpy.diff(values["target"]) - values["target_velocity"][1:]) > 2
+    assert beyond.sum() <= 1 and numpy.count_nonzero(values["target_velocity"]) > 100
     assert values["target"][-1] > values["target"][0]
     assert values["position"][-1] == values["target"][-1] - values["error"][-1]
     assert numpy.abs(values["velocity"]).max() > 0 and numpy.abs(values["command"]).max() > 0

@@ -21,7 +21,7 @@ the motion.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -335,17 +335,19 @@ def measure(
         low = low_band(response, high, low_hz, wished / float(axis.period_nm) * COUNTS)
         if low is None:
             return response
-        with softened(axis, tuning, softness(response, low_hz)):
-            return joined(recorded(axis, low, wished, records, one_more), response, tuning)
+        factor = softness(response, low_hz)
+        return joined(
+            recorded(axis, low, wished, records, one_more, lambda: softened(axis, tuning, factor)),
+            response,
+            tuning,
+        )
 
     override = axis.override()
     try:
         if wished:
             velocity = axis.get_parameter("velocity").counts * float(axis.period_nm)  # nm/s
             axis.override(min(1.0, wished / velocity))
-        response = axis.stopping_on_error(work)
-        axis.dwell(STARTING_S)  # it comes to rest with its own gains
-        return check(response)
+        return check(axis.stopping_on_error(work))
     finally:
         axis.override(override)
 
@@ -381,8 +383,13 @@ def recorded(
     speed_nm_s: float,
     records: int,
     progress: Callable[[], object],
+    meanwhile: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> Response:
-    """The response by some records, each with a motion of its own."""
+    """The response by some records, each with a motion of its own.
+
+    `meanwhile` is in force while the axis moves evenly and is excited. Gains that change then leave
+    the command as it is, so that friction makes no error.
+    """
     scope, length = TickScope(axis), len(excitation.values)
     period_s, every = length * excitation.tick_s, excitation.sparse
     scope.load(excitation.values)
@@ -392,7 +399,7 @@ def recorded(
             way_nm = speed_nm_s * (SETTLING_PERIODS + PERIODS + 2) * period_s
             axis.begin_move(nm=way_nm if number % 2 == 0 else -way_nm, by=True)
             axis.dwell(STARTING_S)
-        with scope.excited(length):
+        with meanwhile(), scope.excited(length):
             axis.dwell(SETTLING_PERIODS * period_s)
             scope.start(SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s))
             axis.dwell((PERIODS + 1) * period_s)
