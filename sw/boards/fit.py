@@ -80,6 +80,7 @@ def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
         "AXES": len(machine.axes),
         "FILTERS": machine.filters,
         "SEGMENTS": machine.segments,
+        "SCOPE_WORDS": machine.scope_words,
         "HAS_DRIVE": mask(machine, "drive"),
         **{name: mask(machine, drive) for drive, name in DRIVES.items()},
         **{name: mask(machine, feature) for feature, (name, _) in FEATURES.items()},
