@@ -40,12 +40,15 @@ module node #(
     parameter int HAS_STEPPER = HAS_DRIVE,  // axes with a step generator, needs the drive
     parameter int HAS_DAC = HAS_DRIVE,  // axes with a DAC, needs the drive
     parameter int HAS_FINE_STAGE = HAS_DAC,  // axes with a fine stage, needs the DAC
+    parameter int HAS_SET_POINTS = 0,  // axes that can follow streamed set-points, needs the drive
     parameter int HAS_I2C = 0,  // 1: build the I2C master
     parameter int HAS_PS2 = 0,  // 1: build the PS/2 pass-through
     parameter int HAS_PEER = 0,  // 1: build the peer port
     parameter int HAS_ANGLE_SENSOR = 0,  // 1: build the receiver of the angle sensor
     parameter int HAS_DISPLAY = 0,  // 1: build the numeric display
     parameter int HAS_STATUS_INPUTS = 0,  // 1: build the status inputs
+    parameter int SCOPE_WORDS = 0,  // words of the recorder of ticks; 0: none, and no excitation
+    parameter int HAS_LINK = 0,  // 1: build the real-time link
     parameter int HAS_SERIAL_CORE = 0,  // 1: bit-serial soft core, with its firmware in a flash
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
     parameter FIRMWARE = "",  // file of its contents at power-up
@@ -62,6 +65,10 @@ module node #(
     input  wire               rs485_rx,             // pin, idles high
     output logic              rs485_tx,             // pin, idles high
     output logic              rs485_driver_enable,  // pin, 1: drive the bus
+    // serial line of the real-time link
+    input  wire               link_rx,              // pin, idles high
+    output logic              link_tx,              // pin, idles high
+    output logic              link_driver_enable,   // pin, 1: drive the line
     // flash of a serial core
     output logic              flash_cs_n,           // pin, low during a command
     output logic              flash_sclk,           // pin, idles low
@@ -119,12 +126,18 @@ module node #(
     localparam int LIMIT_PERIOD = CLK_HZ / 80_000;  // cycles
     localparam int SERVO_FILTERS = HAS_FILTERS % (1 << AXES) != 0 ? FILTERS : 0;
 
+    // masters of the register bus: the soft core, then the real-time link, if there is one
+    localparam int MASTERS = 1 + HAS_LINK;
+    wire [MASTERS-1:0] master_request, master_ready, master_select, master_write;
+    wire [16*MASTERS-1:0] master_address;
+    wire [32*MASTERS-1:0] master_wdata;
+    wire [   MASTERS-1:0] master_waits = MASTERS'(core_waits || crc_waits);
     // register bus
-    wire select, write, node_select, bus_select, peripherals_select;
+    wire select, write, node_select, bus_select, peripherals_select, link_select;
     wire [AXES-1:0] axis_select, feedback_select, actuator_select;
     wire [15:0] bus_address;
     wire [31:0] wdata, wdata_low, rdata;
-    wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata;
+    wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata, link_rdata;
     wire memory_ready, stores, hold, engine_waits, core_waits, crc_waits;
     wire [13:0] stored_at;
     wire [31:0] stored_value;
@@ -148,8 +161,20 @@ module node #(
     wire [AXES-1:0] play, arm, controlled_stop, hold_target, request_waits, pending;
     wire result_valid, result_flag, servo_overrun;
     wire [2:0] result_axis, result_kind;
-    wire [47:0] result;
+    wire [47:0] result, computed;  // with and without the excitation
     wire [15:0] cycles;
+    wire [31:0] tick_count;
+    wire [32*AXES-1:0] stream_states, stream_counts;
+    // recorder of ticks, excitation
+    wire [2:0] scope_axis, excitation_axis;
+    wire [5:0] scope_signals;
+    wire [15:0] scope_length, scope_every;
+    wire scope_start, scope_read, scope_recording, scope_full, excitation_written;
+    wire        [31:0] scope_word;
+    wire        [12:0] excitation_period;
+    wire        [14:0] excitation_limit;
+    wire signed [15:0] excitation_value;
+    wire        [11:0] excitation_at;
     // lines of motor steps
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;
@@ -167,9 +192,10 @@ module node #(
     wire signed [16:0] chain_step;
     wire               sample_overrun;
     // interlock
+    wire link_request, link_makes, link_writes, link_expired;
+    wire [15:0] link_address;
+    wire [31:0] link_wdata;
     wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
-
-    wire registers_ready = memory_ready && !engine_waits && !core_waits && !crc_waits;
 
     if (HAS_SERIAL_CORE != 0) begin : g_serial_core
         serial_core #(
@@ -180,11 +206,12 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (registers_ready),
-            .select,
-            .write,
-            .address(bus_address),
-            .wdata,
+            .request(master_request[0]),
+            .ready  (master_ready[0]),
+            .select (master_select[0]),
+            .write  (master_write[0]),
+            .address(master_address[15:0]),
+            .wdata  (master_wdata[31:0]),
             .rdata,
             .trap,
             // flash
@@ -200,11 +227,12 @@ module node #(
         ) u_core (
             .clk,
             .rst,
-            .ready  (registers_ready),
-            .select,
-            .write,
-            .address(bus_address),
-            .wdata,
+            .request(master_request[0]),
+            .ready  (master_ready[0]),
+            .select (master_select[0]),
+            .write  (master_write[0]),
+            .address(master_address[15:0]),
+            .wdata  (master_wdata[31:0]),
             .rdata,
             .trap
         );
@@ -212,6 +240,27 @@ module node #(
 
         wire unused = &{1'b0, flash_miso};
     end
+    register_arbiter #(
+        .MASTERS(MASTERS),
+        .HOLD   (HAS_SERIAL_CORE != 0 ? 1023 : 63)
+    ) u_arbiter (
+        .clk,
+        .rst,
+        // masters
+        .request   (master_request),
+        .waits     (master_waits),
+        .ready     (master_ready),
+        .select    (master_select),
+        .write     (master_write),
+        .address   (master_address),
+        .wdata     (master_wdata),
+        // register bus
+        .bus_ready (memory_ready && !engine_waits),
+        .bus_select(select),
+        .bus_write (write),
+        .bus_address,
+        .bus_wdata (wdata)
+    );
     register_memory #(
         .AXES             (AXES),
         .FILTERS          (FILTERS == 0 ? 0 : HAS_FILTERS),
@@ -224,6 +273,7 @@ module node #(
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_MONITOR      (HAS_MONITOR),
         .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SET_POINTS   (HAS_SET_POINTS),
         .HAS_SINE         (HAS_SINE),
         .HAS_STEPPER      (HAS_STEPPER),
         .HAS_VELOCITY     (HAS_VELOCITY),
@@ -256,6 +306,7 @@ module node #(
         .node_rdata,
         .bus_rdata,
         .peripherals_rdata,
+        .link_rdata,
         .axis_rdata,
         .feedback_rdata,
         .actuator_rdata,
@@ -263,6 +314,7 @@ module node #(
         .node_select,
         .bus_select,
         .peripherals_select,
+        .link_select,
         .axis_select,
         .feedback_select,
         .actuator_select
@@ -271,18 +323,19 @@ module node #(
         .clk,
         .rst,
         // register bus
-        .select       (node_select),
+        .select                  (node_select),
         .write,
         .word,
         .wdata,
-        .rdata        (node_rdata),
+        .rdata                   (node_rdata),
         // what is built
-        .clk_hz       (32'(CLK_HZ)),
-        .build_axes   (4'(AXES)),
-        .build_address(address),
-        .build_memory (8'(MEMORY_BYTES / 1024)),
+        .clk_hz                  (32'(CLK_HZ)),
+        .build_axes              (4'(AXES)),
+        .build_address           (address),
+        .build_memory            (8'(MEMORY_BYTES / 1024)),
+        .build_scope             (9'(SCOPE_WORDS / 256)),
         // time
-        .time_stamp   (now),
+        .time_stamp              (now),
         .tick_period,
         .sample_period,
         // firmware
@@ -290,7 +343,26 @@ module node #(
         .start_axes,
         .start_axes_written,
         .wait_time,
-        .wait_time_written
+        .wait_time_written,
+        // streamed set-points
+        .tick_count,
+        // recorder of ticks
+        .scope_axis,
+        .scope_signals,
+        .scope_samples_length    (scope_length),
+        .scope_samples_every     (scope_every),
+        .scope_state_start       (scope_start),
+        .scope_state_recording   (scope_recording),
+        .scope_state_full        (scope_full),
+        .scope_word,
+        .scope_word_read         (scope_read),
+        // excitation
+        .excitation_axis,
+        .excitation_period,
+        .excitation_limit,
+        .excitation_value,
+        .excitation_value_at     (excitation_at),
+        .excitation_value_written(excitation_written)
     );
 
     // the soft core waits while it has nothing to do
@@ -349,11 +421,12 @@ module node #(
     );
 
     motion #(
-        .AXES        (AXES),
-        .FILTERS     (SERVO_FILTERS),
-        .TICK_CYCLES (CLK_HZ / TICK_HZ),
-        .HAS_VELOCITY(32'(HAS_VELOCITY % (1 << AXES) != 0)),
-        .HAS_STEPPER (32'(HAS_STEPPER % (1 << AXES) != 0))
+        .AXES          (AXES),
+        .FILTERS       (SERVO_FILTERS),
+        .TICK_CYCLES   (CLK_HZ / TICK_HZ),
+        .HAS_VELOCITY  (32'(HAS_VELOCITY % (1 << AXES) != 0)),
+        .HAS_SET_POINTS(HAS_SET_POINTS),
+        .HAS_STEPPER   (32'(HAS_STEPPER % (1 << AXES) != 0))
     ) u_motion (
         .clk,
         .rst,
@@ -378,6 +451,7 @@ module node #(
         .block_up,
         .block_down,
         .closed_loop,
+        .enabled    (drive_enable),
         // requests
         .play,
         .arm,
@@ -385,11 +459,15 @@ module node #(
         .hold_target,
         .request_waits,
         .pending,
+        // streamed set-points
+        .tick_count,
+        .stream_states,
+        .stream_counts,
         // results
         .result_valid,
         .result_axis,
         .result_kind,
-        .result,
+        .result     (computed),
         .result_flag,
         // schedule
         .servo_overrun,
@@ -403,6 +481,68 @@ module node #(
         .rate_steep,
         .line_stopped
     );
+
+    if (SCOPE_WORDS != 0) begin : g_scope
+        wire         first;
+        wire [W-1:0] sine = sample_sin[W*scope_axis+:W];
+        wire [W-1:0] cosine = sample_cos[W*scope_axis+:W];
+
+        command_excitation u_excitation (
+            .clk,
+            .rst,
+            // settings
+            .axis       (excitation_axis),
+            .period     (excitation_period),
+            .limit      (excitation_limit),
+            .store      (excitation_written),
+            .store_at   (excitation_at),
+            .store_value(excitation_value),
+            // motion engine
+            .valid      (result_valid),
+            .result_axis,
+            .kind       (result_kind),
+            .result     (computed),
+            // to the axes
+            .excited    (result),
+            .first
+        );
+        tick_recorder #(
+            .WORDS(SCOPE_WORDS)
+        ) u_recorder (
+            .clk,
+            .rst,
+            // settings
+            .start      (scope_start),
+            .axis       (scope_axis),
+            .signals    (scope_signals),
+            .length     (scope_length),
+            .every      (scope_every),
+            // what is recorded
+            .tick,
+            .ready      (first),
+            .sine_cosine({16'($signed(cosine)), 16'($signed(sine))}),
+            .valid      (result_valid),
+            .result_axis,
+            .kind       (result_kind),
+            .result     (result[31:0]),
+            // reading
+            .read       (scope_read),
+            .word       (scope_word),
+            .recording  (scope_recording),
+            .full       (scope_full)
+        );
+    end else begin : g_no_scope
+        assign result = computed;
+        assign {scope_word, scope_recording, scope_full} = '0;
+
+        wire unused_scope = &{
+            1'b0, scope_axis, scope_signals, scope_length, scope_every, scope_start, scope_read
+        };
+        wire unused_excitation = &{
+            1'b0, excitation_axis, excitation_period, excitation_limit, excitation_value,
+            excitation_at, excitation_written
+        };
+    end
 
     // interlock
     core_watchdog #(
@@ -451,6 +591,44 @@ module node #(
         .rs485_tx,
         .rs485_driver_enable
     );
+
+    link_port #(
+        .CLK_HZ(CLK_HZ),
+        .BUILT (HAS_LINK)
+    ) u_link (
+        .clk,
+        .rst,
+        // register bus, as one of its blocks
+        .select          (link_select),
+        .write,
+        .word,
+        .wdata,
+        .rdata           (link_rdata),
+        // register bus, as one of its masters
+        .request         (link_request),
+        .ready           (master_ready[MASTERS-1] && HAS_LINK != 0),
+        .link_select     (link_makes),
+        .link_write      (link_writes),
+        .link_address,
+        .link_wdata,
+        .link_rdata      (rdata),
+        // node
+        .now             (now[31:0]),
+        .watchdog_expired(link_expired),
+        // pins
+        .link_rx,
+        .link_tx,
+        .link_driver_enable
+    );
+    if (HAS_LINK != 0) begin : g_master
+        assign master_request[1] = link_request;
+        assign master_select[1] = link_makes;
+        assign master_write[1] = link_writes;
+        assign master_address[31:16] = link_address;
+        assign master_wdata[63:32] = link_wdata;
+    end else begin : g_no_master
+        wire unused_link = &{1'b0, link_request, link_makes, link_writes, link_address, link_wdata};
+    end
 
     peripherals #(
         .CLK_HZ           (CLK_HZ),
@@ -559,7 +737,8 @@ module node #(
             .HAS_BRIDGE       (HAS_BRIDGE >> n & 1),
             .HAS_STEPPER      (HAS_STEPPER >> n & 1),
             .HAS_DAC          (HAS_DAC >> n & 1),
-            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1)
+            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1),
+            .HAS_SET_POINTS   (HAS_SET_POINTS >> n & 1)
         ) u_axis (
             .clk,
             .rst,
@@ -586,6 +765,7 @@ module node #(
             .sync,
             .estop,
             .watchdog_expired,
+            .link_expired,
             .cpu_stopped,
             // motion_engine: what it is given
             .position             (position[48*n+:48]),
@@ -608,6 +788,9 @@ module node #(
             .result_kind,
             .result,
             .result_flag,
+            // set_point_player
+            .stream_state         (stream_states[32*n+:32]),
+            .stream_counts        (stream_counts[32*n+:32]),
             // step_lines
             .line_start,
             .line_idle,

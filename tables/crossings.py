@@ -27,7 +27,7 @@ BEGIN, END = "<!-- crossings -->", "<!-- /crossings -->"
 WHOLE: dict[str, dict[str, int | str]] = {  # the designs, with all that has pins
     "node": {
         **dict.fromkeys(("HAS_I2C", "HAS_PS2", "HAS_PEER", "HAS_ANGLE_SENSOR"), 1),
-        **dict.fromkeys(("HAS_DISPLAY", "HAS_STATUS_INPUTS", "HAS_SERIAL_CORE"), 1),
+        **dict.fromkeys(("HAS_DISPLAY", "HAS_STATUS_INPUTS", "HAS_SERIAL_CORE", "HAS_LINK"), 1),
     },
     "relay": {},
 }
@@ -46,6 +46,7 @@ RATES: dict[str, float] = {
     "encoder_": EACH_CYCLE,
     "flash_sdi": EACH_CYCLE,
     "rs485_rx": 3e6,  # 3 Mbaud
+    "link_rx": 12e6,  # 12 Mbaud
     "peer_rx": 1e6,
     "sensor_rx": 1e6,
     "i2c_": 8e5,  # 400 kHz

@@ -127,6 +127,7 @@ class Register:
     vector: bool
     text: str
     engine: str  # word of motion_engine that holds it, or none
+    snooped: bool  # taken from what the register memory stores
     fields: tuple[Field, ...]
 
     @property
@@ -197,8 +198,8 @@ class Block:
 
     @property
     def own(self) -> list[Register]:
-        """The registers of which the block itself has something: all but those of the engine."""
-        return [r for r in self.registers if not r.engine]
+        """The registers of which the block itself has something."""
+        return [r for r in self.registers if not r.engine and not r.snooped]
 
     @property
     def own_fields(self) -> list[tuple[Register, Field]]:
@@ -267,8 +268,8 @@ Texts = dict[str, list[str]]  # an expression: the words {kind, word} that it is
 
 @dataclass(frozen=True)
 class Layout:
-    """The words of all blocks as the register memory holds them: the blocks of the node first, then
-    those of each axis.
+    """The words of all blocks with settings that are read back, as the register memory holds them:
+    the blocks of the node first, then those of each axis.
     """
 
     alone: tuple[Block, ...]
@@ -293,6 +294,11 @@ class Layout:
         """Low words of settings of 64 bits: they wait for the high word."""
         wide = [(at, r) for at, r in self.registers if r.wide and r.fields[0].kind == "setting"]
         return [literal(9, at) for at, _ in wide]
+
+    @property
+    def wide(self) -> list[str]:
+        """Low words of all registers of 64 bits."""
+        return [literal(9, at) for at, r in self.registers if r.wide]
 
     @property
     def high(self) -> Texts:
@@ -362,8 +368,9 @@ def layout(blocks: Sequence[Block]) -> Layout:
         raise Refused(f"the blocks of one kind are {SLOT:#x} apart")
     if len(blocks) > 7:
         raise Refused("there are at most 7 kinds of blocks")
-    alone = tuple(b for b in blocks if not b.stride)
-    return Layout(alone, tuple(b for b in blocks if b.stride))
+    stored = [b for b in blocks if any(r.stored for r in b.registers)]
+    alone = tuple(b for b in stored if not b.stride)
+    return Layout(alone, tuple(b for b in stored if b.stride))
 
 
 def span(width: int, low: int = 0) -> str:
@@ -460,15 +467,18 @@ def register_of(node: Node) -> Register:
         raise Refused(f"{node.get_path()}: 32 bits, or 64 with accesswidth 32")
     fields = tuple(field_of(f, node) for f in node.children() if isinstance(f, FieldNode))
     whole = [f.low for f in fields] == list(range(len(fields)))
-    engine = str(node.get_property("engine") or "")
-    if engine and any(f.kind != "setting" or f.on_write for f in fields):
-        raise Refused(f"{node.get_path()}: a word of the engine holds settings only")
+    engine, snooped = str(node.get_property("engine") or ""), bool(node.get_property("snooped"))
+    if (engine or snooped) and any(f.kind != "setting" or f.on_write for f in fields):
+        raise Refused(f"{node.get_path()}: a register without ports holds settings only")
+    if snooped and any("r" not in f.access for f in fields):
+        raise Refused(f"{node.get_path()}: the register memory stores only what can be read")
     if width == 64 and any(f.kind == "setting" and f.reset for f in fields):
         raise Refused(f"{node.get_path()}: a setting of 64 bits begins at 0")
     if vector and not (whole and len({f.kind for f in fields}) == 1):
         raise Refused(f"{node.get_path()}: a vector has one kind of bits, from bit 0 on")
     offset = node.raw_address_offset
-    return Register(node.inst_name, offset, width == 64, vector, described(node), engine, fields)
+    text = described(node)
+    return Register(node.inst_name, offset, width == 64, vector, text, engine, snooped, fields)
 
 
 def read(axes: int = 1, source: Path = SOURCE) -> list[Block]:
@@ -563,9 +573,10 @@ def files() -> dict[Path, str]:
         )
         for b in blocks
     }
-    made[ROOT / "rtl" / "registers" / "register_layout.sv"] = made_files.systemverilog(
-        filled("layout.sv", layout=layout(blocks))
-    )
+    for name, template in (("register_layout", "layout.sv"), ("register_width", "width.sv")):
+        made[ROOT / "rtl" / "registers" / f"{name}.sv"] = made_files.systemverilog(
+            filled(template, layout=layout(blocks))
+        )
     made[ROOT / "sw" / "firmware" / "made" / "registers.h"] = filled("h", blocks=blocks)
     made[ROOT / "sw" / "host" / "moire" / "made" / "registers.py"] = filled("py", blocks=blocks)
     made[ROOT / "docs" / "registers.md"] = filled("md", blocks=blocks)

@@ -33,6 +33,7 @@ module serial_core #(
 ) (
     input  wire         clk,
     input  wire         rst,
+    output logic        request,     // level: an access waits for ready
     input  wire         ready,       // level: the registers take an access in the next cycle
     output logic        select,      // strobe: one access to the registers
     output logic        write,       // level: with select, wdata is to be written
@@ -78,12 +79,13 @@ module serial_core #(
 
     wire                   free = !(select || awaited || answered);
 
+    assign request = valid && in_registers && free && !trap;
     assign write   = storing;
     assign address = data_address[15:0];
 
     always_ff @(posedge clk) begin
         fetched  <= valid && (in_memory || in_port) && !fetched && !trap;
-        select   <= valid && in_registers && ready && free && !trap;
+        select   <= request && ready;
         awaited  <= select;
         answered <= awaited;
         if (valid && !in_memory && !in_registers && !in_port) trap <= 1'b1;

@@ -33,6 +33,7 @@ module soft_core #(
 ) (
     input  wire         clk,
     input  wire         rst,
+    output logic        request,  // level: an access waits for ready
     input  wire         ready,    // level: the registers take an access in the next cycle
     output logic        select,   // strobe: one access to the registers
     output logic        write,    // level: with select, wdata is to be written
@@ -81,13 +82,14 @@ module soft_core #(
     wire memory_ready = has_core || has_ahead || storing;
     wire mem_ready = answered || memory_ready;
 
+    assign request = mem_valid && in_registers && !(select || awaited || answered);
     assign write   = mem_wstrb[0];
     assign address = mem_addr[15:0];
     assign wdata   = mem_wdata;
     assign trap    = core_trap || lost;
 
     always_ff @(posedge clk) begin
-        select    <= mem_valid && in_registers && ready && !(select || awaited || answered);
+        select    <= request && ready;
         awaited   <= select;
         answered  <= awaited;
         next      <= following;
@@ -230,6 +232,7 @@ module soft_core #(
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);
             assert (32'(select) + 32'(awaited) + 32'(answered) <= 1);
+            assert (select == $past(request && ready));
             if (select) assert (mem_valid && !in_memory && !mem_instr && $past(ready));
             if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
             if (select) assert ($stable(address) && $stable(wdata));

@@ -5,12 +5,12 @@
 // latency   1 cycle from a cause to faults and to enabled low, and from command_in to command_out;
 //           2 cycles from a following error to enabled low.
 // behaviour Emergency stop, drive fault and CPU trap always latch. Limit switches (unless homing),
-//           encoder fault, bus watchdog, profile underrun, step overrun, servo overrun, sample
-//           overrun and following error latch while enable is requested. The following error
-//           counts from the second error_valid after enabled and closed_loop are both high, so
-//           that no error measured before then counts. reset_faults clears the faults whose cause
-//           is gone, and only while enable_request is low; nothing restarts by itself. A command
-//           that was made zero stays zero until the next command_in.
+//           encoder fault, bus watchdog, link watchdog, profile underrun, step overrun, servo
+//           overrun, sample overrun and following error latch while enable is requested. The
+//           following error counts from the second error_valid after enabled and closed_loop are
+//           both high, so that no error measured before then counts. reset_faults clears the faults
+//           whose cause is gone, and only while enable_request is low; nothing restarts by itself.
+//           A command that was made zero stays zero until the next command_in.
 // model     tb/interlock/drive_interlock.py, equal in every bit of every cycle
 // proved    Whatever the bus writes: enabled is never high with a latched fault, nor one cycle
 //           after a cause or without a request. A fault is cleared only by reset_faults with
@@ -37,6 +37,7 @@ module drive_interlock (
     input  wire                step_overrun,      // level: the step generator lags too far
     input  wire                servo_overrun,     // strobe: a tick came before the last was served
     input  wire                sample_overrun,    // strobe: the shared chain has lost a sample
+    input  wire                link_expired,      // level: no good packet over the link in time
     input  wire                error_valid,       // strobe: there is a new following error
     input  wire                error_too_far,     // level: with error_valid, it is above its limit
     input  wire signed  [47:0] position,          // 2^-16 period
@@ -45,16 +46,16 @@ module drive_interlock (
     output logic               valid_out,         // strobe: command_out is new or was made zero
     output logic signed [15:0] command_out,       // full scale 2^15
     output logic               enabled,           // level: the drive may be on
-    output logic        [11:0] faults,            // latched; bits as in axis_registers.faults
-    output logic        [11:0] causes_now,        // present causes, same bits as faults
-    output logic        [11:0] first_fault,       // the fault that came first, same bits as faults
+    output logic        [12:0] faults,            // latched; bits as in axis_registers.faults
+    output logic        [12:0] causes_now,        // present causes, same bits as faults
+    output logic        [12:0] first_fault,       // the fault that came first, same bits as faults
     output logic signed [47:0] fault_position,    // 2^-16 period, when first_fault latched
     output logic               block_up,          // level: no positive command passes
     output logic               block_down         // level: no negative command passes
 );
     // Of several causes in the same cycle, first_fault takes the lowest bit.
     // made by tables/interlock_faults.py, not to be edited
-    localparam [11:0] LATCH_ALWAYS = 12'b000011000100;  // estop, drive, cpu
+    localparam [12:0] LATCH_ALWAYS = 13'b0000011000100;  // estop, drive, cpu
     // end of the made constants
 
     // the last error that counted was above the limit
@@ -62,9 +63,9 @@ module drive_interlock (
     // the next error was measured with the drive on
     logic        error_counts;
 
-    wire  [11:0] arrived = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
-    wire  [11:0] held = reset_faults && !enable_request ? faults & causes_now : faults;
-    wire  [11:0] latched = held | arrived;
+    wire  [12:0] arrived = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
+    wire  [12:0] held = reset_faults && !enable_request ? faults & causes_now : faults;
+    wire  [12:0] latched = held | arrived;
     wire         allowed = enable_request && latched == '0;
 
     // command_out is positive, negative; so is the command of this cycle
@@ -73,17 +74,18 @@ module drive_interlock (
     wire         down = valid_in ? command_in[15] : negative;
     wire         blocked = !allowed || (limit_high && up) || (limit_low && down);
 
-    logic [11:0] lowest;  // of the causes that have arrived
+    logic [12:0] lowest;  // of the causes that have arrived
     logic        lower;
     always_comb begin
         lower = 1'b0;
-        for (int n = 0; n < 12; n++) begin
+        for (int n = 0; n < 13; n++) begin
             lowest[n] = arrived[n] && !lower;
             lower     = lower || arrived[n];
         end
     end
 
     assign causes_now = {
+        link_expired,
         sample_overrun,
         servo_overrun,
         step_overrun,

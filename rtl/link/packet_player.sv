@@ -42,6 +42,7 @@ module packet_player (
     input  wire  [47:0] refused,     // counts of refused packets
     input  wire         expired,     // level: the watchdog has expired
     // register bus
+    output logic        request,     // level: an access waits for ready
     input  wire         ready,       // level: the registers take an access in the next cycle
     output logic        select,      // strobe: an access
     output logic        write,       // level: with select, wdata is to be written
@@ -94,7 +95,7 @@ module packet_player (
     logic          writing;
     logic   [ 1:0] number;  // of the byte
     logic [31:0] fetched, reply_word;  // what the memories have read
-    logic free, waits, done;
+    logic free, done;
     wire  [31:0] crc;
 
     // words of the phase
@@ -161,7 +162,7 @@ module packet_player (
         .at,
         .value(fetched),
         .free,
-        .waits,
+        .waits(request),
         .done,
         // register bus
         .ready,
@@ -229,7 +230,7 @@ module packet_player (
         if (rst) state <= IDLE;
     end
 
-    wire unused = &{1'b0, free, waits};
+    wire unused = &{1'b0, free};
 
 `ifdef FORMAL
     logic past = 1'b0;
@@ -242,7 +243,7 @@ module packet_player (
             if (busy) assert (phase <= SEAL);
             assert (free == (state != ANSWER));
             // an access waits, is made, or is being answered
-            assert (32'(!free) == 32'(waits) + 32'(select) + 32'($past(select)) + 32'(done));
+            assert (32'(!free) == 32'(request) + 32'(select) + 32'($past(select)) + 32'(done));
             if (select) assert (state == ANSWER);
             if (state == TAKE || state == ANSWER) assert (phase != HEAD && phase < SEND);
             if (state == BYTES) assert (phase == SEND || phase == SEAL);

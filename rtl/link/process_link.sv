@@ -42,6 +42,7 @@ module process_link #(
     output logic        tx_last,      // level: with tx_valid, the last byte
     input  wire         tx_taken,     // level: with tx_valid, the byte is taken in this cycle
     // register bus
+    output logic        request,      // level: an access waits for ready
     input  wire         ready,        // level: the registers take an access in the next cycle
     output logic        select,       // strobe: an access
     output logic        write,        // level: with select, wdata is to be written
@@ -98,6 +99,7 @@ module process_link #(
         .refused,
         .expired,
         // register bus
+        .request,
         .ready,
         .select,
         .write,

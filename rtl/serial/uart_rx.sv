@@ -2,22 +2,23 @@
 // uart_rx -- receive the characters of a UART: start bit, 8 data bits LSB first, a 9th bit if there
 // is one, stop bit.
 //
-// latency   2 cycles at most between valid and the middle of the stop bit; valid comes 1/8 bit
+// latency   2 cycles at most between valid and the middle of the stop bit; valid comes 1/PARTS bit
 //           later if the first two samples of the stop bit differ.
 // rate      characters without any gap
-// method    Each bit is the majority of three samples, 1/8 bit apart, around its middle. The stop
-//           bit is decided as soon as two samples agree, so that the start bit of a faster sender
-//           is not missed.
+// method    Each bit is the majority of three samples, 1/PARTS bit apart, around its middle. The
+//           stop bit is decided as soon as two samples agree, so that the start bit of a faster
+//           sender is not missed.
 // behaviour data and ninth stay as they are for two bit times from valid on.
-// limits    bit_time from 8 cycles up; 8 cycles are added to less. From 16 cycles up the two ends
-//           may differ by 4 % of the bit time.
+// limits    bit_time from PARTS cycles up; as many are added to less. From 16 cycles up the two
+//           ends may differ by 4 % of the bit time.
 // source    S0: the 9th bit marks command bytes
 // model     tb/serial/uart_rx.py, equal in every bit of every cycle
 // proved    A start bit ends once: as a character, as a framing error, or as a glitch.
 `default_nettype none
 
 module uart_rx #(
-    parameter int NINTH = 1  // bits after the 8 data bits: 1, or 0 for 8N1
+    parameter int NINTH = 1,  // bits after the 8 data bits: 1, or 0 for 8N1
+    parameter int PARTS = 8   // ticks of a bit: 8, or 4 for bits of less than 8 cycles
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -34,6 +35,7 @@ module uart_rx #(
         NINTH_MUST_BE_0_OR_1 u_error ();
     end
 
+    localparam int L = $clog2(PARTS);
     localparam logic [3:0] STOP = NINTH != 0 ? 4'd10 : 4'd9;
 
     typedef enum logic [1:0] {
@@ -45,24 +47,27 @@ module uart_rx #(
     state_t             state;
     logic               rx_q;  // the level that is sampled: the edge is half a cycle old on average
     logic   [      1:0] seen;  // the two samples before
-    // eighths of a bit since the start bit began, 3 more: the last sample of bit n is at 8 n + 7
-    logic   [      6:0] eighth;
+    // parts of a bit since the start bit began, and half a bit less one part more: the last sample
+    // of bit n is in its last part
+    logic   [    L+3:0] part;
     logic   [7+NINTH:0] shifted;
     wire                tick;
 
     // number of the bit: 0 start, 1..8 data, 9 ninth, STOP
-    wire    [      3:0] bit_number = eighth[6:3];
+    wire    [      3:0] bit_number = part[L+3:L];
     wire                first = bit_number == 4'd0;
     wire                last = bit_number == STOP;
-    wire                agreed = eighth[2:0] == 3'd6 && seen[0] == rx_q;
-    wire                decide = state == RECEIVE && tick && (&eighth[2:0] || (last && agreed));
+    wire                agreed = part[L-1:0] == L'(PARTS - 2) && seen[0] == rx_q;
+    wire                decide = state == RECEIVE && tick && (&part[L-1:0] || (last && agreed));
     wire                level = (seen[0] & seen[1]) | (seen[0] & rx_q) | (seen[1] & rx_q);
 
     assign busy  = state != IDLE;
     assign data  = shifted[7:0];
     assign ninth = NINTH != 0 && shifted[7+NINTH];
 
-    bit_timer u_timer (
+    bit_timer #(
+        .PARTS(PARTS)
+    ) u_timer (
         .clk,
         .bit_time,
         .restart(state == IDLE),
@@ -74,8 +79,8 @@ module uart_rx #(
         framing_error <= decide && last && !level;
         start_glitch  <= decide && first && level;
 
-        if (state == IDLE) eighth <= 7'd3;
-        else if (tick) eighth <= eighth + 7'd1;
+        if (state == IDLE) part <= (L + 4)'(PARTS / 2 - 1);
+        else if (tick) part <= part + 1'b1;
         rx_q <= rx;
         if (tick) seen <= {seen[0], rx_q};
         if (decide && !first && !last) shifted <= {level, shifted[7+NINTH:1]};

@@ -2,22 +2,23 @@
 // uart_tx -- send the characters of a UART on a shared line: start bit, 8 data bits LSB first, a
 // 9th bit if there is one, stop bit.
 //
-// latency   1 cycle from valid to driver_enable when idle; the start bit follows 9/8 bit times
+// latency   1 cycle from valid to driver_enable when idle; the start bit follows a bit and a part
 //           later.
 // rate      characters without any gap
-// method    Bit n begins 8 n ticks of bit_timer after the start bit, so that rounding errors never
-//           add up.
+// method    Bit n begins PARTS * n ticks of bit_timer after the start bit, so that rounding errors
+//           never add up.
 // behaviour driver_enable leads the first start bit by at least one bit, and follows the last stop
-//           bit by at least half a bit: by one eighth of a bit more each, since a tick may come a
+//           bit by at least half a bit: by one part of a bit more each, since a tick may come a
 //           cycle early.
-// limits    bit_time from 8 cycles up; 8 cycles are added to less.
+// limits    bit_time from PARTS cycles up; as many are added to less.
 // source    S0: the 9th bit marks command bytes
 // model     tb/serial/uart_tx.py, equal in every bit of every cycle
 // proved    The line is high whenever it is not driven.
 `default_nettype none
 
 module uart_tx #(
-    parameter int NINTH = 1  // bits after the 8 data bits: 1, or 0 for 8N1
+    parameter int NINTH = 1,  // bits after the 8 data bits: 1, or 0 for 8N1
+    parameter int PARTS = 8   // ticks of a bit: 8, or 4 for bits of less than 8 cycles
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -29,12 +30,13 @@ module uart_tx #(
     output logic        tx,             // level: the line, idles high
     output logic        driver_enable,  // level: the line driver is on
     output logic        busy,           // level: the line is driven
-    output logic        tick            // strobe: an eighth of a bit; 8 per bit while busy
+    output logic        tick            // strobe: a part of a bit; PARTS per bit while busy
 );
     if (NINTH != 0 && NINTH != 1) begin : g_check
         NINTH_MUST_BE_0_OR_1 u_error ();
     end
 
+    localparam int L = $clog2(PARTS);
     localparam logic [3:0] STOP = NINTH != 0 ? 4'd10 : 4'd9;
 
     typedef enum logic [1:0] {
@@ -44,21 +46,23 @@ module uart_tx #(
         TRAIL
     } state_t;
 
-    state_t       state;
-    logic   [3:0] number;  // of the bit: 0 start, 1..8 data, 9 ninth, STOP; before them -2 and -1
-    logic   [2:0] eighth;  // of the bit
-    logic   [8:0] shifted;  // the bits to come, the next one lowest
+    state_t         state;
+    logic   [  3:0] number;  // of the bit: 0 start, 1..8 data, 9 ninth, STOP; before them -2 and -1
+    logic   [L-1:0] part;  // of the bit
+    logic   [  8:0] shifted;  // the bits to come, the next one lowest
 
-    wire          ends = tick && &eighth;
-    wire          begins = state == LEAD && ends && number[0];
-    wire          goes_on = state == SEND && ends && number == STOP;
-    wire          take = valid && ready;
+    wire            ends = tick && &part;
+    wire            begins = state == LEAD && ends && number[0];
+    wire            goes_on = state == SEND && ends && number == STOP;
+    wire            take = valid && ready;
 
     assign ready         = begins || goes_on || state == TRAIL;
     assign driver_enable = state != IDLE;
     assign busy          = state != IDLE;
 
-    bit_timer u_timer (
+    bit_timer #(
+        .PARTS(PARTS)
+    ) u_timer (
         .clk,
         .bit_time,
         .restart(state == IDLE || (state == TRAIL && valid)),
@@ -66,9 +70,9 @@ module uart_tx #(
     );
 
     always_ff @(posedge clk) begin
-        if (state == IDLE) {number, eighth} <= {4'd14, 3'd7};
-        else if (take) {number, eighth} <= 7'd0;
-        else if (tick) {number, eighth} <= {number, eighth} + 7'd1;
+        if (state == IDLE) {number, part} <= {4'd14, {L{1'b1}}};
+        else if (take) {number, part} <= '0;
+        else if (tick) {number, part} <= {number, part} + 1'b1;
 
         if (take) begin
             tx      <= 1'b0;
@@ -80,7 +84,7 @@ module uart_tx #(
             LEAD:    if (ready)           state <= valid ? SEND : TRAIL;
             SEND:    if (ready && !valid) state <= TRAIL;
             TRAIL:   if (valid)           state <= SEND;
-                     else if (tick && eighth == 3'd4) state <= IDLE;
+                     else if (tick && part == L'(PARTS / 2)) state <= IDLE;
             default:  // unreachable: state has one of its four values
                 state <= IDLE;
         endcase

@@ -24,6 +24,7 @@ module counter_box_bench #(
     wire [3:0] adc_cs_n, adc_sclk, compare_pulse, bridge_a, bridge_b, step, direction;
     wire [3:0] dac_cs_n, dac_sclk, dac_sdi, drive_enable;
     wire i2c_scl_low, i2c_sda_low, keyboard_clock_low, keyboard_data_low, edm_clock_low;
+    wire link_tx, link_driver_enable;
     wire edm_data_low, peer_tx, display_cs_n, display_sclk, display_data;
 
     node #(
@@ -46,6 +47,9 @@ module counter_box_bench #(
         .rs485_rx,
         .rs485_tx,
         .rs485_driver_enable,
+        .link_rx        (1'b1),
+        .link_tx,
+        .link_driver_enable,
         .flash_cs_n,
         .flash_sclk,
         .flash_mosi,
@@ -96,7 +100,7 @@ module counter_box_bench #(
         1'b0, adc_cs_n, adc_sclk, compare_pulse, bridge_a, bridge_b, step, direction, dac_cs_n,
         dac_sclk, dac_sdi, drive_enable, i2c_scl_low, i2c_sda_low, keyboard_clock_low,
         keyboard_data_low, edm_clock_low, edm_data_low, peer_tx, display_cs_n, display_sclk,
-        display_data
+        display_data, link_tx, link_driver_enable
     };
 endmodule
 

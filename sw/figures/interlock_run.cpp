@@ -48,16 +48,17 @@ enum Cause {  // the bits of axis.faults
     OVERRUN = AXIS_FAULTS_STEP_OVERRUN_SHIFT,
     SERVO = AXIS_FAULTS_SERVO_OVERRUN_SHIFT,
     SAMPLE = AXIS_FAULTS_SAMPLE_OVERRUN_SHIFT,
+    LINK = AXIS_FAULTS_LINK_WATCHDOG_SHIFT,
     CAUSES
 };
 static_assert(LIMIT_LOW == 0 && LIMIT_HIGH == 1 && ESTOP == 2 && FOLLOWING == 3 && ENCODER == 4 &&
                   WATCHDOG == 5 && DRIVE == 6 && CPU == 7 && UNDERRUN == 8 && OVERRUN == 9 &&
-                  SERVO == 10 && SAMPLE == 11,
+                  SERVO == 10 && SAMPLE == 11 && LINK == 12,
               "NAMES has the order of axis.faults");
-const char* const NAMES[CAUSES] = {"limit_low",       "limit_high",    "estop",
-                                   "following_error", "encoder",       "bus_watchdog",
-                                   "drive",           "cpu",           "profile_underrun",
-                                   "step_overrun",    "servo_overrun", "sample_overrun"};
+const char* const NAMES[CAUSES] = {
+    "limit_low",     "limit_high",     "estop",        "following_error",  "encoder",
+    "bus_watchdog",  "drive",          "cpu",          "profile_underrun", "step_overrun",
+    "servo_overrun", "sample_overrun", "link_watchdog"};
 constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU};
 constexpr unsigned LATCH_ALWAYS = 1 << ESTOP | 1 << DRIVE | 1 << CPU;
 

@@ -23,6 +23,7 @@ module one_axis_bench (
     // node
     input wire estop,  // level: 1 pressed
     input wire watchdog_expired,  // level: the master of the bus is silent
+    input wire link_expired,  // level: no good packet over the link in time
     input wire cpu_stopped,  // level: the soft core has stopped or hangs
     input wire other_sample,  // strobe: a sample of the other converter
     output logic sample_valid,  // strobe: a sample of the axis
@@ -179,6 +180,7 @@ module one_axis_bench (
         .sync              (1'b0),
         .estop,
         .watchdog_expired,
+        .link_expired,
         .cpu_stopped,
         .position,
         .step_made,

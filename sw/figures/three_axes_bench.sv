@@ -55,6 +55,7 @@ module three_axes_bench (
             .sync              (1'b0),
             .estop             (1'b0),
             .watchdog_expired  (1'b0),
+            .link_expired      (1'b0),
             .cpu_stopped       (1'b0),
             .servo_overrun     (1'b0),
             .sample_overrun    (1'b0),

@@ -92,7 +92,7 @@ async def latency_is_1_from_an_address_and_0_from_select_to_the_select_of_its_bl
         await Timer(1, "ns")
         assert not any(selects(dut))
         await FallingEdge(dut.clk)
-    assert chosen == {"node": (1, 0, 0, 0, 0, 0), "axis": (0, 0, 0, 1, 0, 0)}
+    assert chosen == {"node": (1, 0, 0, 0, 0, 0, 0), "axis": (0, 0, 0, 0, 1, 0, 0)}
 
 
 @cocotb.test()
@@ -117,8 +117,7 @@ async def latency_is_1_from_the_answers_to_rdata(dut):
 async def no_block_is_selected_at_other_addresses(dut):
     model = await begin(dut)
     for address in (
-        0x300,
-        0x3FC,
+        0x1C00,
         *(first + 0x100 * model.axes for first in OF_AXES.values()),
         0xFFFC,
     ):

@@ -307,8 +307,8 @@ def test_registers_are_read_by_address_but_never_a_queue():
         1,
         2,
         3,
-        0x300,
-        0x3FC,
+        0x301,
+        0x1C00,
         DEFINES["AXIS_BASE"] + DEFINES["AXIS_STRIDE"],
         0xFFFC,
         0xFFFF,
@@ -319,6 +319,17 @@ def test_registers_are_read_by_address_but_never_a_queue():
         assert machine.request("read_register", address=address)[0] == "no_such_register", hex(
             address
         )
+
+
+def test_the_registers_of_the_link_are_written_only_where_it_is_built():
+    machine = CompiledNode()
+    entry = {"address": DEFINES["LINK_BASE"] + DEFINES["LINK_ENTRY"], "value": 0x0410_0400}
+    assert machine.request("write_register", **entry)[0] == "not_built"
+    machine.link[DEFINES["LINK_STATE"]] = DEFINES["LINK_STATE_BUILT_MASK"]
+    assert machine.request("write_register", **entry)[0] == "ok"
+    assert machine.link[DEFINES["LINK_ENTRY"]] == 0x0410_0400
+    wrong = entry | {"address": entry["address"] + 2}
+    assert machine.request("write_register", **wrong)[0] == "no_such_register"
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,13 @@ FOLLOWING_ERROR, ENCODER = FAULTS["following_error"], FAULTS["encoder"]
 BUS_WATCHDOG, DRIVE, CPU = (FAULTS[name] for name in ("bus_watchdog", "drive", "cpu"))
 PROFILE_UNDERRUN, STEP_OVERRUN = FAULTS["profile_underrun"], FAULTS["step_overrun"]
 SERVO_OVERRUN, SAMPLE_OVERRUN = FAULTS["servo_overrun"], FAULTS["sample_overrun"]
+LINK_WATCHDOG = FAULTS["link_watchdog"]
 LATCH_ALWAYS = ESTOP | DRIVE | CPU
 
 INPUTS = dict.fromkeys(
     """enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault
     encoder_fault watchdog_expired cpu_trap profile_underrun step_overrun servo_overrun
-    sample_overrun error_valid error_too_far position valid_in command_in""".split(),
+    sample_overrun link_expired error_valid error_too_far position valid_in command_in""".split(),
     0,
 )
 
@@ -43,6 +44,7 @@ class DriveInterlock:
             i["step_overrun"],
             i["servo_overrun"],
             i["sample_overrun"],
+            i["link_expired"],
         )
         return sum(1 << n for n, cause in enumerate(present) if cause)
 

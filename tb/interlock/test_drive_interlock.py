@@ -19,6 +19,7 @@ from tb.interlock.drive_interlock import (
     INPUTS,
     LIMIT_HIGH,
     LIMIT_LOW,
+    LINK_WATCHDOG,
     PROFILE_UNDERRUN,
     SAMPLE_OVERRUN,
     SERVO_OVERRUN,
@@ -38,6 +39,7 @@ CAUSES = dict(
     step_overrun=STEP_OVERRUN,
     servo_overrun=SERVO_OVERRUN,
     sample_overrun=SAMPLE_OVERRUN,
+    link_expired=LINK_WATCHDOG,
 )
 STROBES = ("profile_underrun", "servo_overrun", "sample_overrun")  # causes that end by themselves
 ALWAYS = ("estop", "drive_fault", "cpu_trap")

@@ -9,7 +9,7 @@ import zlib
 from moire.made import link_tables as layout
 from tb.registers.register_access import RegisterAccess
 
-NAMES = ("busy", "select", "write", "address", "wdata", "valid", "data", "last")
+NAMES = ("busy", "request", "select", "write", "address", "wdata", "valid", "data", "last")
 
 
 class PacketPlayer:
@@ -29,7 +29,7 @@ class PacketPlayer:
         written = access.wdata if access.write else None
         held = (access.write, access.address, written) if access.select else (None,) * 3
         sent = int(self.byte is not None)
-        return self.busy, access.select, *held, sent, self.byte, self.last
+        return self.busy, access.waits, access.select, *held, sent, self.byte, self.last
 
     def stored(self, place):
         """A word of the request that is played."""

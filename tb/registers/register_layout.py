@@ -12,7 +12,7 @@ class RegisterLayout:
 
     def __init__(self, axes=1, built=None):
         self.built, self.entries, self.slots = built or {}, {}, {}
-        blocks = tables.read(axes)
+        blocks = [b for b in tables.read(axes) if any(r.stored for r in b.registers)]
         of_axes = [b for b in blocks if b.count > 1 or b.stride]
         self.bits = (len(blocks) - len(of_axes) + len(of_axes) * axes - 1).bit_length()
         for index, block in enumerate(blocks):

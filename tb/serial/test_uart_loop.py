@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""uart_tx and uart_rx without the 9th bit (8N1): one character by hand, every byte, sigrok, and
-noise against both models.
+"""uart_tx and uart_rx without the 9th bit (8N1), with eight and with four ticks of a bit: one
+character by hand, every byte, sigrok, and noise against both models.
 """
 
 import random
@@ -11,9 +11,10 @@ from fractions import Fraction
 from pathlib import Path
 
 import cocotb
+import pytest
 from cocotb.triggers import FallingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.serial.uart_rx import UartRx, character, line
 from tb.serial.uart_tx import UartTx
 
@@ -22,7 +23,8 @@ class Loop:
     """Both designs with their models beside them in every cycle."""
 
     def __init__(self, dut):
-        self.dut, self.sender, self.receiver = dut, UartTx(0), UartRx(0)
+        self.dut, self.parts = dut, int(dut.PARTS.value)
+        self.sender, self.receiver = UartTx(0, self.parts), UartRx(0, self.parts)
         self.received, self.wave, self.errors = [], bytearray(), 0
 
     async def begin(self):
@@ -81,7 +83,8 @@ async def the_waveform_of_one_character_is_as_drawn_by_hand(dut):
 
 @cocotb.test()
 async def every_byte_arrives_without_gaps_and_with_gaps(dut):
-    for bit_time, gaps in ((128, False), (139, True)):
+    shortest = 16 * int(dut.PARTS.value)
+    for bit_time, gaps in ((shortest, False), (139, True)):
         loop = await Loop(dut).begin()
         await loop.send(range(256), bit_time, gaps)
         assert loop.received == list(range(256)) and loop.errors == 0
@@ -112,7 +115,7 @@ async def bit_times_may_differ_by_4_percent(dut):
 async def noise_matches_the_models(dut):
     loop = await Loop(dut).begin()
     for _ in range(300):
-        bit_time, level = random.choice([128, 133, 256]), random.choice([None, 0, 1])
+        bit_time, level = random.choice([64, 80, 128, 133, 256]), random.choice([None, 0, 1])
         for _ in range(random.randrange(1, 60)):
             await loop.clk(bit_time, random.choice([None, random.getrandbits(8)]), level)
 
@@ -146,5 +149,21 @@ async def sigrok_reads_8n1(dut):
     ]
 
 
-def test_character_loop():
-    run("uart_loop", __file__)
+@cocotb.test()
+async def bits_of_5_cycles_may_differ_by_2_percent(dut):
+    """12 Mbaud at 60 MHz; the edges come at any part of a cycle."""
+    needs(int(dut.PARTS.value) == 4, "a bit of 5 cycles has 4 parts")
+    for percent in (98, 100, 102):
+        for phase in range(5):
+            loop = await Loop(dut).begin()
+            sent = [0x00, 0xFF, 0x80, 0x01, 0x55]
+            bits = [1, *(b for byte in sent for b in character(byte, None)), 1, 1]
+            levels = line(bits, Fraction(5 * percent, 100), Fraction(phase, 5))
+            for level in levels:
+                await loop.clk(80, rx=level)
+            assert loop.received == sent, f"{percent} %, {phase}"
+
+
+@pytest.mark.parametrize("parts", [8, 4])
+def test_character_loop(parts):
+    run("uart_loop", __file__, PARTS=parts)

@@ -2,7 +2,9 @@
 // uart_loop -- bench top: a transmitter and a receiver of 8N1 characters, on one line or on two.
 `default_nettype none
 
-module uart_loop (
+module uart_loop #(
+    parameter int PARTS = 8  // ticks of a bit
+) (
     input  wire         clk,
     input  wire         rst,
     input  wire  [19:0] bit_time,       // 1/16 cycle
@@ -21,7 +23,8 @@ module uart_loop (
 );
     /* verilator lint_off PINCONNECTEMPTY */
     uart_tx #(
-        .NINTH(0)
+        .NINTH(0),
+        .PARTS(PARTS)
     ) u_transmitter (
         .clk,
         .rst,
@@ -37,7 +40,8 @@ module uart_loop (
     );
     /* verilator lint_on PINCONNECTEMPTY */
     uart_rx #(
-        .NINTH(0)
+        .NINTH(0),
+        .PARTS(PARTS)
     ) u_receiver (
         .clk,
         .rst,

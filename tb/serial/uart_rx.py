@@ -11,9 +11,9 @@ from tb.serial.bit_timer import BitTimer
 
 
 class UartRx:
-    def __init__(self, ninth=1):
-        self.last = 9 + ninth  # number of the stop bit
-        self.state, self.timer, self.ticks = "release", BitTimer(), 0
+    def __init__(self, ninth=1, parts=8):
+        self.last, self.parts = 9 + ninth, parts  # number of the stop bit; ticks of a bit
+        self.state, self.timer, self.ticks = "release", BitTimer(parts), 0
         self.bits, self.samples = [], []
         self.data = self.ninth = self.rx = None
 
@@ -29,7 +29,7 @@ class UartRx:
                 self.state = "idle"
         elif tick:
             self.ticks += 1
-            if self.ticks % 8 in (3, 4, 5):
+            if abs(self.ticks % self.parts - self.parts // 2) <= 1:
                 self.samples.append(self.rx)
                 if (
                     len(self.samples) == 3

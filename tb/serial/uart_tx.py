@@ -7,13 +7,12 @@ it, for the same bit_time; `ready` is also the answer to `valid` of the next cyc
 
 from tb.serial.bit_timer import BitTimer
 
-LEAD, TRAIL = 9, 5  # eighths of a bit
-
 
 class UartTx:
-    def __init__(self, ninth=1):
-        self.has_ninth = ninth
-        self.state, self.bits, self.timer, self.left = "idle", [], BitTimer(), 0
+    def __init__(self, ninth=1, parts=8):
+        self.has_ninth, self.parts = ninth, parts
+        self.lead, self.trail = parts + 1, parts // 2 + 1  # ticks
+        self.state, self.bits, self.timer, self.left = "idle", [], BitTimer(parts), 0
 
     def ready(self, bit_time):
         """left: ticks until the lead, the bit or the trail ends."""
@@ -35,15 +34,15 @@ class UartTx:
             self.state = "idle"
         elif take:
             self.bits = [0, *(data >> n & 1 for n in range(8)), *[ninth] * self.has_ninth, 1]
-            self.state, self.left = "send", 8
+            self.state, self.left = "send", self.parts
         elif self.state == "idle":
-            self.state, self.left = ("lead" if valid else "idle"), LEAD
+            self.state, self.left = ("lead" if valid else "idle"), self.lead
         elif tick and self.left > 1:
             self.left -= 1
         elif tick and self.state == "send" and len(self.bits) > 1:
             self.bits.pop(0)
-            self.left = 8
+            self.left = self.parts
         elif tick:
-            self.state, self.left = ("idle" if trail else "trail"), TRAIL
+            self.state, self.left = ("idle" if trail else "trail"), self.trail
         tx = self.bits[0] if self.state == "send" else 1
         return self.ready(bit_time), tx, int(self.state != "idle")

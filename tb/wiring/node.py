@@ -30,6 +30,7 @@ PARAMETERS = {
     "HAS_ANGLE_SENSOR": 1,
     "HAS_DISPLAY": 1,
     "HAS_STATUS_INPUTS": 1,
+    "HAS_LINK": 1,
     "MEMORY_BYTES": 4096,
     "FIRMWARE": '""',
 }
@@ -39,6 +40,7 @@ IDLE = dict(
     drive_fault_n=7,
     peer_rx=1,
     sensor_rx=1,
+    link_rx=1,
     i2c_scl=1,
     i2c_sda=1,
     keyboard_clock=1,

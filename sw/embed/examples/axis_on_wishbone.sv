@@ -324,6 +324,7 @@ module axis_on_wishbone #(
         .sync              (1'b0),
         .estop,
         .watchdog_expired  (1'b0),
+        .link_expired      (1'b0),
         .cpu_stopped,
         .position,
         .step_made,

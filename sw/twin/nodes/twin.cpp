@@ -54,7 +54,7 @@ class Core {  // a Verilated node and its clock
             pins.adc_cos = 0;
         pins.limit_low_open = pins.limit_high_open = 0;
         pins.drive_fault_n = ALL_AXES;
-        pins.sensor_rx = pins.peer_rx = 1;
+        pins.sensor_rx = pins.peer_rx = pins.link_rx = 1;
         set_peripheral_pins(pins, PERIPHERAL_SENSE_IDLE);
         pins.rst = 1;
         model_->eval();
@@ -137,6 +137,10 @@ class Node {
     }
     void look() { event_at_ = 0; }  // at each machine in the next cycle: one may have been changed
     bool peer_tx() const { return !core_ || core_->pins.peer_tx; }
+    bool link_tx() const { return !core_ || core_->pins.link_tx; }
+    void hear_link(bool level) {
+        if (core_) core_->pins.link_rx = level;
+    }
     void hear_peer(bool level) {
         if (core_) core_->pins.peer_rx = level;
     }
@@ -198,6 +202,11 @@ struct PeerDirection {
     PeerLine line;
 };
 
+struct Link {  // a host at the real-time link of a node
+    int node;
+    PeerLine to_node, to_host;
+};
+
 class Twin {
  public:
     Twin(uint64_t seed, int count, const uint8_t* addresses, const Firmware& firmware,
@@ -222,6 +231,11 @@ class Twin {
         for (auto& peer : peers)
             nodes[size_t(peer.to)]->hear_peer(
                 peer.line.step(now, nodes[size_t(peer.from)]->peer_tx()));
+        for (auto& link : links) {
+            Node& node = *nodes[size_t(link.node)];
+            link.to_host.step(now, node.link_tx());
+            node.hear_link(link.to_node.step(now, true));
+        }
         if (now == flip.at)
             flip.made = nodes[flip.node]->flip(REGISTERS[flip.register_], flip.word, flip.bit);
     }
@@ -231,6 +245,7 @@ class Twin {
     Bus bus;
     std::vector<std::unique_ptr<Node>> nodes;
     std::deque<PeerDirection> peers;  // at fixed addresses
+    std::deque<Link> links;           // likewise
 
  private:
     const Firmware firmware_;
@@ -394,6 +409,14 @@ uint64_t twin_digest(Twin* t, int node) { return t->nodes[size_t(node)]->digest(
 void* twin_join_peers(Twin* t, int from, int to, uint64_t seed, double baud) {
     t->peers.push_back({from, to, PeerLine(seed, 0x9EE2u + unsigned(from), CLK_HZ, baud)});
     return &t->peers.back().line;
+}
+// A host at the real-time link of a node: the two directions, whose functions are peer_line_*.
+void twin_join_link(Twin* t, int node, uint64_t seed, double baud, void** lines) {
+    const auto stream = 0x11A4u + unsigned(node) * 2;
+    t->links.push_back({node, PeerLine(seed, stream, CLK_HZ, baud),
+                        PeerLine(seed, stream + 1, CLK_HZ, baud)});
+    lines[0] = &t->links.back().to_node;
+    lines[1] = &t->links.back().to_host;
 }
 void twin_power(Twin* t, int node, int on) { t->nodes[size_t(node)]->power(t->now, on); }
 

@@ -73,12 +73,14 @@ WITH_SEGMENTS = {
     **NODE,
     "SEGMENTS": 255,
 }  # and with its segment table, which takes a fifteenth of the speed
+WITH_SCOPE = {**WITH_SEGMENTS, "FILTERS": 2, "SCOPE_WORDS": 16384}  # and with all to tune its servo
 BAUD = 115200
 BREAK_S = 0.003  # the line low; nodes want 2 ms
 # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
 TURNAROUND_CELLS = 2
 CELLS = 11  # of a character: start, eight data, 9th, stop
 PEER_BAUD = 9600  # between nodes
+LINK_BIT_CYCLES = 5  # of the real-time link
 ALL_PERIPHERALS = dict.fromkeys(PERIPHERALS, 1)
 CUTS = {"none": 0, "idle": 1, "break": 2}
 
@@ -102,6 +104,7 @@ FUNCTIONS: Functions = {
     "twin_machine": (HANDLE, [HANDLE, WHOLE]),
     "twin_attach_devices": (HANDLE, [HANDLE, WHOLE, HANDLE, ctypes.c_uint, LONG, WHOLE]),
     "twin_join_peers": (HANDLE, [HANDLE, WHOLE, WHOLE, LONG, REAL]),
+    "twin_join_link": (None, [HANDLE, WHOLE, LONG, REAL, HANDLE]),
     "twin_power": (None, [HANDLE, WHOLE, WHOLE]),
     "twin_register": (ctypes.c_char_p, [WHOLE, HANDLE]),
     "twin_flip_at": (None, [HANDLE, LONG, WHOLE, WHOLE, WHOLE, WHOLE]),
@@ -157,11 +160,44 @@ class BusState:
     words_waiting: int
 
 
+class LinkLine:
+    """The host's end of the serial line of a real-time link: bytes, in the time of the machine.
+
+    A bit takes LINK_BIT_CYCLES cycles, as 12 Mbaud at 60 MHz.
+    """
+
+    def __init__(self, twin: "Twin", to_node: PeerLineHandle, to_host: PeerLineHandle) -> None:
+        self.twin, self.to_node, self.to_host = twin, to_node, to_host
+
+    @property
+    def bit_time(self) -> int:
+        """The bit time of the line for the register link.bit_time, in 1/16 cycle."""
+        return 16 * LINK_BIT_CYCLES
+
+    def send(self, data: bytes) -> None:
+        """Begins to send bytes to the node; no time passes."""
+        self.to_node.put(data)
+
+    def take(self) -> bytes:
+        """The bytes that have come from the node since the last call; no time passes."""
+        return self.to_host.take_received()
+
+    def exchange(self, data: bytes, seconds: float) -> bytes:
+        """Sends bytes, lets so much time pass, and returns what came from the node until then."""
+        self.send(data)
+        self.twin.run(seconds)
+        return self.take()
+
+
 def library(
-    clk_hz: int, axes: int, words: Sequence[int], node: Mapping[str, int] | None = None
+    clk_hz: int,
+    axes: int,
+    words: Sequence[int],
+    node: Mapping[str, int | str] | None = None,
+    netlist: str | None = None,
 ) -> ctypes.CDLL:
     """The library of a build, with its functions declared."""
-    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node, words)))
+    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node, words, netlist)))
     declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **DEVICES_FUNCTIONS, **PEER_FUNCTIONS})
     return found
 
@@ -190,7 +226,8 @@ class Twin:
     one in sw/firmware. `host_baud_error` 0.02 makes the host 2 % fast. `node_parameters` {"W": 12}
     are parameters of rtl/node.sv, drives(*DRIVES) builds all actuators, WITH_SEGMENTS a segment
     table. All nodes have all peripherals if one of them has devices or peers; `peers` are the
-    numbers of two nodes that a serial line connects.
+    numbers of two nodes that a serial line connects. `netlist` is a family of FPGAs (ecp5, ice40,
+    gowin), perhaps with options of its synthesis: the nodes are then the netlists of it.
     """
 
     def __init__(
@@ -204,9 +241,10 @@ class Twin:
         plant: Mapping[str, float] | None = None,
         plant_of: Mapping[int, Mapping[str, float]] | None = None,
         firmware: Sequence[int] | None = None,
-        node_parameters: Mapping[str, int] = NODE,
+        node_parameters: Mapping[str, int | str] = NODE,
         peers: tuple[int, int] | None = None,
         peer_baud: float = PEER_BAUD,
+        netlist: str | None = None,
     ) -> None:
         self.handle: int | None = None
         built = [node if isinstance(node, Node) else Node(node, [Axis()] * axes) for node in nodes]
@@ -224,7 +262,7 @@ class Twin:
         ]
         words = build.firmware(axes=self.node_axes) if firmware is None else firmware
         self.library, self.clk_hz, self.baud = (
-            library(clk_hz, self.node_axes, words, node_parameters),
+            library(clk_hz, self.node_axes, words, node_parameters, netlist),
             clk_hz,
             baud,
         )
@@ -273,6 +311,7 @@ class Twin:
             )
             for pair in pairs
         }
+        self.seed, self.now, self.links = seed, now, dict[int, LinkLine]()
         if host_baud_error:
             self.set_host_baud(baud * (1 + host_baud_error))
 
@@ -460,6 +499,20 @@ class Twin:
         if (sender, receiver) not in self.peer_lines:
             raise LookupError(f"no serial line leads from node {sender} to node {receiver}")
         return self.peer_lines[sender, receiver]
+
+    # real-time link
+
+    def link(self, node: int = 0) -> "LinkLine":
+        """The host's end of the real-time link of a node that was built with HAS_LINK."""
+        if self.check_node(node) not in self.links:
+            lines = (ctypes.c_void_p * 2)()
+            baud = self.clk_hz / LINK_BIT_CYCLES
+            self.library.twin_join_link(
+                self.handle, node, self.seed, baud, ctypes.addressof(lines)
+            )
+            ends = [PeerLineHandle(self.library, int(line or 0), self.now) for line in lines]
+            self.links[node] = LinkLine(self, *ends)
+        return self.links[node]
 
     # power
 

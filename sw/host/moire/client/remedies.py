@@ -30,6 +30,8 @@ FAULTS = {
     "step_overrun": "lower velocity, or step_high and step_low; check steps_per_period",
     "servo_overrun": "build the node with fewer axes or a faster clock; report it",
     "sample_overrun": "build the node with fewer axes or slower converters; report it",
+    "link_watchdog": "keep the master of the real-time link running while a drive is on, or switch "
+    "the link off; if the master ran, check the line and the counts of refused packets",
 }
 ENCODER_EVENTS = {
     "illegal_edge": "look at A and B with an oscilloscope: noise, a missing termination or a head "

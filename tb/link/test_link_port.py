@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""link_port: requests of the host's codec on its serial line are answered there and reach the
+register bus; damaged lines; the watchdog; and a node without it. Its blocks have models of their
+own.
+"""
+
+import random
+
+import cocotb
+import pytest
+from cobs import cobs
+from cocotb.triggers import FallingEdge, ReadOnly
+
+from moire.bus.cobs import sealed, unstuff
+from moire.bus.link import Link, Spare
+from moire.made.registers import FIELDS
+from tb.bench import needs, run, start
+from tb.serial.uart_rx import UartRx, character, line
+
+SESSION = 0x00BEEF
+BIT = 5  # cycles: 12 Mbaud at 60 MHz
+TURNAROUND = 2  # bits
+CLK_HZ = 1_000_000
+IDLE = dict(select=0, write=0, word=0, wdata=0, ready=1, link_rdata=0, now=0, link_rx=1)
+
+
+class Port:
+    """The port with a host at its line, and registers behind its register bus."""
+
+    def __init__(self, dut):
+        self.dut, self.receiver, self.heard = dut, UartRx(0, 4), bytearray()
+        self.registers, self.answers, self.now = {}, [0, 0], 0
+        self.driven, self.drops = 0, 0  # driver enable now, and how often it fell
+
+    async def clk(self, rx=1, **inputs):
+        dut = self.dut
+        self.now += 1
+        driven = int(dut.link_driver_enable.value)
+        assert driven or int(dut.link_tx.value), "the line is idle without the driver"
+        self.drops += self.driven and not driven
+        self.driven = driven
+        inputs = IDLE | {"now": self.now, "link_rx": rx, "link_rdata": self.answers.pop(0)} | inputs
+        for name, level in inputs.items():
+            getattr(dut, name).value = level
+        await ReadOnly()
+        answer = self.answers[-1]
+        if int(dut.link_select.value):
+            address = int(dut.link_address.value)
+            if int(dut.link_write.value):
+                self.registers[address] = int(dut.link_wdata.value)
+            answer = self.registers.get(address, address + 1)
+        self.answers.append(answer)
+        valid, byte, *_ = self.receiver.step(int(dut.link_tx.value), 16 * BIT)
+        if valid:
+            self.heard.append(byte)
+        await FallingEdge(dut.clk)
+
+    async def write(self, register, **values):
+        """A register of the port by its fields."""
+        fields = [f for f in FIELDS if (f.block, f.register) == ("link", register)]
+        word = sum(values.get(f.field, 0) << f.low for f in fields)
+        await self.clk(select=1, write=1, word=fields[0].address(0) // 4 % 64, wdata=word)
+
+    async def read(self, register):
+        fields = [f for f in FIELDS if (f.block, f.register) == ("link", register)]
+        await self.clk(select=1, word=fields[0].address(0) // 4 % 64)
+        word = int(self.dut.rdata.value)
+        return {f.field: f.value(word) for f in fields}
+
+    async def set_up(self, enable=1):
+        await self.write("bit_time", value=16 * BIT)
+        for n, (write, read) in enumerate(((0x400, 0x410), (0x404, 0x414))):
+            await self.write("entry_number", value=n)
+            await self.write("entry", write=write, read=read)
+        await self.write("session", value=SESSION)
+        await self.write("lists", writes=2, reads=2)
+        await self.write("watchdog_time", value=20)
+        await self.write("enable", value=enable)
+        return Link(SESSION, 2, 2)
+
+    async def send(self, content, percent=100):
+        """Bytes of the host, after the time that the node needs to let go of the line."""
+        for _ in range(TURNAROUND * BIT):
+            await self.clk()
+        bits = [bit for byte in content for bit in character(byte, None)]
+        for level in line([*bits, 1], BIT * percent / 100):
+            await self.clk(level)
+
+    async def reply(self, most=60 * 10 * BIT):
+        """The content of the next packet of the port; None if there is none."""
+        self.heard.clear()
+        for _ in range(most):
+            await self.clk()
+            if self.heard.endswith(b"\0") and len(self.heard) > 1:
+                assert self.heard[0] == 0
+                return unstuff(bytes(self.heard[1:-1]))
+        return None
+
+
+async def begin(dut):
+    await start(dut, **IDLE)
+    await FallingEdge(dut.clk)
+    port = Port(dut)
+    for _ in range(20):
+        await port.clk()
+    return port
+
+
+def has_link(dut):
+    needs(int(dut.BUILT.value), "a node without a link")
+
+
+@cocotb.test()
+async def requests_on_the_line_are_played_and_answered(dut):
+    has_link(dut)
+    port = await begin(dut)
+    host = await port.set_up()
+    for value in range(3):
+        request = host.request(0, [value, 7], Spare(0x500, 33))
+        await port.send(sealed(request), random.choice([99, 100, 101]))
+        reply = host.reply(await port.reply())
+        assert reply and reply.values == (0x411, 0x415) and not any(reply.refused.values())
+        assert port.registers == {0x400: value, 0x404: 7, 0x500: 33}
+    assert await port.read("state") == dict(built=1, on=1, busy=0, expired=0, session=SESSION)
+    for _ in range(4 * BIT):
+        await port.clk()
+    assert port.drops == 3, "the driver stays on during a reply"
+
+
+@cocotb.test()
+async def a_damaged_line_is_counted_and_the_next_request_is_answered(dut):
+    has_link(dut)
+    port = await begin(dut)
+    host = await port.set_up()
+    packet = host.request(0, [1, 2])
+    bent = bytearray(packet)
+    bent[5] ^= 4
+    lost = cobs.encode(packet)[:-3] + b"\0"
+    for sent in (sealed(bytes(bent)), lost):
+        await port.send(sent)
+        assert await port.reply(20 * BIT) is None
+    for level in line([0] * 11 + [1], BIT):  # a break: a byte without a stop bit
+        await port.clk(level)
+    assert not port.registers
+    assert await port.read("framing_errors") == dict(value=1)
+    await port.send(sealed(packet))
+    reply = host.reply(await port.reply())
+    assert reply and reply.refused["damaged"] == 3 and port.registers == {0x400: 1, 0x404: 2}
+    assert (await port.read("refused"))["damaged"] == 3
+
+
+@cocotb.test()
+async def the_watchdog_expires_without_requests_and_only_while_the_link_is_on(dut):
+    has_link(dut)
+    port = await begin(dut)
+    await port.set_up(enable=0)
+    for _ in range(21_000):
+        await port.clk()
+    assert not int(dut.watchdog_expired.value)
+    await port.write("enable", value=1)
+    for _ in range(20_010):
+        await port.clk()
+    assert int(dut.watchdog_expired.value) and (await port.read("state"))["expired"]
+
+
+@cocotb.test()
+async def without_a_link_nothing_answers_and_nothing_is_accessed(dut):
+    needs(not int(dut.BUILT.value), "a node with a link")
+    port = await begin(dut)
+    host = await port.set_up()
+    await port.send(sealed(host.request(0, [1, 2])))
+    assert await port.reply(300) is None and not port.registers and not port.driven
+    assert await port.read("state") == dict(built=0, on=0, busy=0, expired=0, session=0)
+    assert not int(dut.watchdog_expired.value)
+
+
+@pytest.mark.parametrize("built", [1, 0])
+def test_link_port(built):
+    run("link_port", __file__, CLK_HZ=CLK_HZ, BUILT=built)
