@@ -288,6 +288,20 @@ def test_a_travel_whose_ends_are_swapped_is_refused_by_the_host():
     assert axis.get_parameter("travel_high").value == -2_000_000
 
 
+def test_a_travel_that_excludes_a_homed_axis_is_refused_by_the_host():
+    node = BusNode()
+    axis = Bus(Rs485Bus(node)).axis()
+    axis.set_parameter("travel_low", "1mm")  # without a zero positions mean nothing
+    axis.set_parameter("travel_low", "-1mm")
+    node.home()
+    with pytest.raises(OutOfRange, match="outside a travel of 1mm to .*: move it inside first"):
+        axis.set_parameter("travel_low", "1mm")
+    with pytest.raises(OutOfRange, match="outside a travel of"):
+        axis.load_parameters({"travel_low": "-1mm", "travel_high": "-0.5mm", "kp": 3})
+    assert node.parameter("travel_low") == -1250 * PERIOD and node.parameter("kp") != 3 << 16
+    axis.set_parameter("travel_low", "0mm")  # within a period of where it is
+
+
 def test_refusals_carry_the_words_of_the_table_and_the_values():
     wire, node, axis = stage()
     with pytest.raises(
