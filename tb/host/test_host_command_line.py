@@ -707,12 +707,15 @@ def test_baud_and_parity_reach_the_port():
     assert call.options.baud == 9600
 
 
-@pytest.mark.parametrize("option, patience_s", [("", 0.1), ("--patience 2s", 2)])
-def test_each_of_five_tries_has_the_patience_that_is_given(option, patience_s):
+@pytest.mark.parametrize(
+    "option, tries, patience_s",
+    [("", 5, 0.1), ("--patience 2s", 5, 2), ("--timeout 2s --tries 3", 3, 2)],
+)
+def test_each_of_the_tries_has_the_patience_that_is_given(option, tries, patience_s):
     bus = Rs485Bus(BusNode())
     bus.from_nodes = lambda word: []
-    assert "asked 5 times" in sentence(Call(f"status {option}", bus=bus), 3)
-    assert 5 * patience_s < bus.now() < 5 * patience_s + 0.1
+    assert f"asked {tries} times" in sentence(Call(f"status {option}", bus=bus), 3)
+    assert tries * patience_s < bus.now() < tries * patience_s + 0.1
 
 
 def test_help_names_every_command_and_gives_examples(capsys):

@@ -651,7 +651,7 @@ def test_the_first_set_up_is_followed_step_by_step(browser, context):
         see(page, "#setup [data-step=limits][data-state=done]", "following_limit is 40um")
         assert served.node.parameter("following_limit") == 50 * 65536
         page.locator("#setup").get_by_role("button", name="Home").click()
-        see(page, "#setup [data-step=home][data-state=done]", "homed at 0.000")
+        see(page, "#setup [data-step=home][data-state=done]", "homed at")
         for width in WIDTHS:
             page.set_viewport_size({"width": width, "height": 1000})
             assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -17,7 +17,7 @@ export class CalibrationPanel {
         <label>Axis <select name="axis"></select></label>
         <label data-field="distance">Distance in mm <input name="distance" size="5" value="1" autocomplete="off"></label>
         <button type="submit">Calibrate</button>
-        <button type="button" data-do="read">Read</button>
+        <button type="button" data-do="read">Show the correction</button>
       </form>
       <p class="note" data-field="hint">Home the axis first. It moves to and fro; every stop ends the calibration.</p>
       <p class="message" role="status"></p>
