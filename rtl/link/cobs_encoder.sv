@@ -43,7 +43,7 @@ module cobs_encoder #(
         ENDS    // and the zero behind it
     } state_t;
 
-    (* no_rw_check *)logic [7:0] memory[0:2**A-1];
+    (* no_rw_check *) logic [7:0] memory[0:2**A-1];
     state_t state;
     logic [A-1:0] next;  // where the next byte goes
     logic [A-1:0] code_at;  // where the code of the block goes; all before it is complete

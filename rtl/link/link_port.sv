@@ -18,26 +18,26 @@ module link_port #(
     input  wire         clk,
     input  wire         rst,
     // register bus, as one of its blocks
-    input  wire         select,              // strobe: an access to this block
-    input  wire         write,               // level: the access writes
-    input  wire  [ 5:0] word,                // 32-bit word of the block
-    input  wire  [31:0] wdata,               // value to write
-    output logic [31:0] rdata,               // value read, in the next cycle; else 0
+    input  wire         select,             // strobe: an access to this block
+    input  wire         write,              // level: the access writes
+    input  wire  [ 5:0] word,               // 32-bit word of the block
+    input  wire  [31:0] wdata,              // value to write
+    output logic [31:0] rdata,              // value read, in the next cycle; else 0
     // register bus, as one of its masters
-    output logic        request,             // level: an access waits for ready
-    input  wire         ready,               // level: the registers take it in the next cycle
-    output logic        link_select,         // strobe: an access
-    output logic        link_write,          // level: it writes
-    output logic [15:0] link_address,        // byte address, from 1 cycle before link_select on
-    output logic [31:0] link_wdata,          // word to be written
-    input  wire  [31:0] link_rdata,          // word read, 2 cycles after link_select
+    output logic        request,            // level: an access waits for ready
+    input  wire         ready,              // level: the registers take it in the next cycle
+    output logic        link_select,        // strobe: an access
+    output logic        link_write,         // level: it writes
+    output logic [15:0] link_address,       // byte address, from 1 cycle before link_select on
+    output logic [31:0] link_wdata,         // word to be written
+    input  wire  [31:0] link_rdata,         // word read, 2 cycles after link_select
     // node
-    input  wire  [31:0] now,                 // cycles, time of the node
-    output logic        watchdog_expired,    // level: no good request for too long
+    input  wire  [31:0] now,                // cycles, time of the node
+    output logic        watchdog_expired,   // level: no good request for too long
     // pins
-    input  wire         link_rx,             // pin, idles high
-    output logic        link_tx,             // pin, idles high
-    output logic        link_driver_enable   // pin, 1: drive the line
+    input  wire         link_rx,            // pin, idles high
+    output logic        link_tx,            // pin, idles high
+    output logic        link_driver_enable  // pin, 1: drive the line
 );
     if (BUILT == 0) begin : g_none
         assign {rdata, request, link_select, link_write, link_address, link_wdata} = '0;
@@ -49,7 +49,7 @@ module link_port #(
     end else begin : g_link
         // settings
         wire [23:0] session, time_window;
-        wire [ 6:0] lists_writes, lists_reads, entry_number;
+        wire [6:0] lists_writes, lists_reads, entry_number;
         wire [15:0] entry_write, entry_read, watchdog_time;
         wire [19:0] bit_time;
         wire entry_written, enable;

@@ -63,7 +63,9 @@ module packet_receiver (
     wire [31:0] crc;
 
     wire [31:0] advance = sequence_number - last;
-    wire [31:0] late = now - stamp + {8'd0, time_window};  // 0 to twice the window are in time
+    wire [31:0] late = now - stamp;  // cycles, signed
+    wire [31:0] off = late ^ {32{late[31]}};  // its size, one less if it is negative
+    wire        near = off[31:24] == '0 && {off[23:0], 1'b0} < {time_window, !late[31]};
     wire [ 9:0] length = {{1'b0, writes} + 8'(FRAME_WORDS), 2'b00};  // bytes of a request
     wire        some = count != '0 || lost || broken;
     wire [ 5:0] checks = {idle, timely, later, fits, ours, whole};  // the first one is bit 0
@@ -72,7 +74,7 @@ module packet_receiver (
     crc32_stream u_crc (
         .clk,
         .rst,
-        .start(valid && count == '0),
+        .start(ends),
         .valid,
         .data,
         .crc
@@ -98,7 +100,7 @@ module packet_receiver (
         ours   <= known && enable && !missed;
         fits   <= count == length;
         later  <= advance != '0 && !advance[31];
-        timely <= time_window == '0 || late <= {7'd0, time_window, 1'b0};
+        timely <= time_window == '0 || near;
         idle   <= !busy;
 
         if (accepted) begin

@@ -81,7 +81,7 @@ module relay_requests #(
     // a frame has begun; there was a request; this one repeats it
     logic open, heard, again;
     logic closing;  // the CRC-32 is being sent
-    logic sum_start, sum_valid;  // of the CRC-32, one cycle behind the answer
+    logic sum_start, sum_valid;  // of the CRC-32, which is one cycle behind the answer
     logic [  7:0] answer_q;
 
     wire          keep = valid && !command && open;
@@ -121,7 +121,7 @@ module relay_requests #(
         set_valid  <= 1'b0;
         pass_valid <= 1'b0;
         flags      <= flags | events;
-        sum_start  <= sent && first;
+        sum_start  <= state == READ;
         sum_valid  <= sent && !closing;
         answer_q   <= answer;
         case (state)

@@ -11,7 +11,7 @@
 module crc32_stream (
     input  wire         clk,
     input  wire         rst,
-    input  wire         start,  // strobe: start again; a byte of the same cycle is the first
+    input  wire         start,  // strobe: start again; a byte of the same cycle is left out
     input  wire         valid,  // strobe: data is the next byte
     input  wire  [ 7:0] data,   // byte
     output logic [31:0] crc     // CRC-32 of the bytes since start
@@ -19,8 +19,6 @@ module crc32_stream (
     localparam logic [31:0] POLYNOMIAL = 32'hEDB88320;
 
     logic [31:0] remainder;
-
-    wire  [31:0] from = start ? '1 : remainder;
 
     function automatic [31:0] divided(input [31:0] dividend);
         divided = dividend;
@@ -31,9 +29,8 @@ module crc32_stream (
     assign crc = ~remainder;
 
     always_ff @(posedge clk) begin
-        if (valid) remainder <= divided(from ^ {24'd0, data});
-        else if (start) remainder <= '1;
-        if (rst) remainder <= '1;
+        if (valid) remainder <= divided(remainder ^ {24'd0, data});
+        if (start || rst) remainder <= '1;
     end
 endmodule
 

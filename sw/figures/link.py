@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the real-time link: is a bad packet ever acted upon, and how large is the hardware.
+"""Figures of the real-time link: is a bad packet ever acted upon, how large is the hardware, and
+how fast is it with eight axes.
 
-The packets go into the Verilated process_link (link_run.cpp). A packet counts as acted upon when it
-causes an access of the register bus or a reply, or when it is not counted as refused exactly once.
+The bad packets go into the Verilated process_link (link_run.cpp). A packet counts as acted upon
+when it causes an access of the register bus or a reply, or when it is not counted as refused
+exactly once. The times are those of a whole simulated node of 60 MHz, with its firmware.
 """
 
 from functools import cache
@@ -10,14 +12,85 @@ from pathlib import Path
 
 from figures.common import Figure, Quick, bar, console, shares
 from figures.synthesis import ELABORATED, elaborated, lut4s, netlist_of, source_of
+from moire.bus.cobs import PacketReader, sealed
+from moire.bus.link_gateway import LONGEST_STUFFED
+from moire.client.bus import Bus
+from moire.client.link import ProcessData
 from moire.errors import MoireError
+from twin import Axis, Node, Twin, TwinTransport
 from twin.build import ROOT, run, simulation
+from twin.nodes.twin import drives
 
 TOP = "process_link"
 RTL = ROOT / "rtl" / "link" / f"{TOP}.sv"
 DRIVER = Path(__file__).with_name("link_run.cpp")
 PACKETS = 10**6
 SHARE = 10**5  # of one run, each with a seed of its own
+
+
+CLK_HZ = 60_000_000
+USB_CYCLES, RS485_CYCLES = 5, 20  # of a bit: 12 and 3 Mbaud
+AXES = 8
+DATA = ProcessData(
+    writes=["axis.open_command", "axis.control", "node.start_axes"],
+    reads=["axis.position", "axis.velocity", "axis.faults"],
+)
+TURNAROUND = 2  # bits from a reply to the next request
+BUS_BAUD = 1_000_000
+STEP_S = 4 / CLK_HZ  # resolution of a time
+LONGEST_S = 0.005  # a cycle
+
+
+@cache
+def cycle_times(bit_cycles: int, cycles: int, axes: int, seed: int) -> tuple[float, float]:
+    """Longest of some cycles in seconds: from the end of a reply to that of the next one, and that
+    without the bits on the line.
+    """
+    with Twin(
+        [Node(1, [Axis("stepper_stage")] * axes)],
+        seed=seed,
+        clk_hz=CLK_HZ,
+        node_parameters={**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0, "HAS_LINK": 1},
+    ) as twin:
+        bus = Bus(TwinTransport(twin))
+        twin.run_until_ready()
+        bus.set_baud(BUS_BAUD, [1])
+        line, reader = twin.link(bit_cycles=bit_cycles), PacketReader(LONGEST_STUFFED)
+        link = DATA.set_up(bus.node(1), bit_time=line.bit_time, watchdog_s=0)
+        whole, inside = [], []
+        for _ in range(cycles):
+            request = sealed(link.request(0, [0] * link.writes))
+            begin, packets = twin.time(), list[bytes]()
+            twin.run(TURNAROUND * bit_cycles / CLK_HZ)
+            line.send(request)
+            while not packets and twin.time() - begin < LONGEST_S:
+                twin.run(STEP_S)
+                packets = reader.feed(line.take())
+            reply = link.reply(packets[0]) if packets else None
+            if reply is None or any(reply.refused.values()):
+                raise MoireError(f"no good reply within {LONGEST_S} s: {reply}")
+            took = twin.time() - begin
+            bits = TURNAROUND + 10 * (len(request) + len(sealed(packets[0])))
+            whole.append(took)
+            inside.append(took - bits * bit_cycles / CLK_HZ)
+        console.print(
+            f"{axes} axes, {len(request)} and {len(sealed(packets[0]))} bytes of "
+            f"{10 * bit_cycles} cycles: {1e6 * max(whole):.1f} us, "
+            f"{1e6 * max(inside):.1f} us without the line"
+        )
+        return max(whole), max(inside)
+
+
+def link_serial_us(cycles: int = 20, axes: int = AXES, seed: int = 1) -> float:
+    return 1e6 * cycle_times(USB_CYCLES, cycles, axes, seed)[1]
+
+
+def link_usb_khz(cycles: int = 20, axes: int = AXES, seed: int = 1) -> float:
+    return 1e-3 / cycle_times(USB_CYCLES, cycles, axes, seed)[0]
+
+
+def link_rs485_khz(cycles: int = 20, axes: int = AXES, seed: int = 1) -> float:
+    return 1e-3 / cycle_times(RS485_CYCLES, cycles, axes, seed)[0]
 
 
 @cache
@@ -51,6 +124,7 @@ def link_lut(place: bool = True, seed: int = 1) -> float:
     return lut4s(netlist_of(source_of(TOP), {}, "ecp5", seed), TOP)
 
 
+SHORT = Quick({"cycles": 2, "axes": 2}, "2 cycles of 2 axes")
 FIGURES = {
     "link_wrong_accepted": Figure(
         link_wrong_accepted,
@@ -69,5 +143,31 @@ FIGURES = {
         "<= 900",
         ELABORATED,
         0,
+    ),
+    "link_serial_us": Figure(
+        link_serial_us,
+        "us",
+        "packet in to packet out: time of a cycle without that of the bytes on the line, 8 axes "
+        "(17 words written, 32 read) at 60 MHz, the longest of 20 cycles of a simulated node",
+        "<= 20",
+        SHORT,
+        0,
+    ),
+    "link_usb_khz": Figure(
+        link_usb_khz,
+        "kHz",
+        "cycles for these 8 axes over USB-serial at 12 Mbaud, one after the other; the delays of "
+        "USB and of the host are not included",
+        ">= 2",
+        SHORT,
+        2,
+    ),
+    "link_rs485_khz": Figure(
+        link_rs485_khz,
+        "kHz",
+        "cycles for these 8 axes over RS-485 at 3 Mbaud, one after the other",
+        ">= 1",
+        SHORT,
+        2,
     ),
 }

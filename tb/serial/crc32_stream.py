@@ -13,6 +13,6 @@ class Crc32Stream:
     def step(self, start, valid, data, rst=0):
         if start or rst:
             self.crc = 0
-        if valid and not rst:
+        elif valid:
             self.crc = zlib.crc32(bytes([data]), self.crc)
         return self.crc

@@ -63,7 +63,7 @@ module axis_on_wishbone #(
 
     // register bus
     wire select, write, memory_ready, waits, hold, stores;
-    wire node_select, bus_select, peripherals_select;
+    wire node_select, bus_select, peripherals_select, link_select;
     wire axis_select, feedback_select, actuator_select;
     wire [15:0] address;
     wire [31:0] wdata, wdata_low, rdata, memory_rdata, node_rdata;
@@ -149,12 +149,14 @@ module axis_on_wishbone #(
         .node_rdata,
         .bus_rdata        (32'd0),
         .peripherals_rdata(32'd0),
+        .link_rdata       (32'd0),
         .axis_rdata,
         .feedback_rdata,
         .actuator_rdata,
         .node_select,
         .bus_select,
         .peripherals_select,
+        .link_select,
         .axis_select,
         .feedback_select,
         .actuator_select,
@@ -393,7 +395,7 @@ module axis_on_wishbone #(
         .drive_enable
     );
 
-    wire unused_bus = &{1'b0, address[1:0], bus_select, peripherals_select, wait_time};
+    wire unused_bus = &{1'b0, address[1:0], bus_select, peripherals_select, link_select, wait_time};
     wire unused_time = &{1'b0, wait_time_written, tick_period[23:18], armed, cycles, result_axis};
     wire unused_chain = &{
         1'b0, chain_setting_written, chain_harmonic_enable, chain_learn, sample_valid, sample_sin,

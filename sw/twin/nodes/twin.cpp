@@ -413,8 +413,8 @@ void* twin_join_peers(Twin* t, int from, int to, uint64_t seed, double baud) {
 // A host at the real-time link of a node: the two directions, whose functions are peer_line_*.
 void twin_join_link(Twin* t, int node, uint64_t seed, double baud, void** lines) {
     const auto stream = 0x11A4u + unsigned(node) * 2;
-    t->links.push_back({node, PeerLine(seed, stream, CLK_HZ, baud),
-                        PeerLine(seed, stream + 1, CLK_HZ, baud)});
+    t->links.push_back(
+        {node, PeerLine(seed, stream, CLK_HZ, baud), PeerLine(seed, stream + 1, CLK_HZ, baud)});
     lines[0] = &t->links.back().to_node;
     lines[1] = &t->links.back().to_host;
 }

@@ -80,7 +80,7 @@ BREAK_S = 0.003  # the line low; nodes want 2 ms
 TURNAROUND_CELLS = 2
 CELLS = 11  # of a character: start, eight data, 9th, stop
 PEER_BAUD = 9600  # between nodes
-LINK_BIT_CYCLES = 5  # of the real-time link
+LINK_BIT_CYCLES = 5  # of the real-time link: 12 Mbaud at 60 MHz
 ALL_PERIPHERALS = dict.fromkeys(PERIPHERALS, 1)
 CUTS = {"none": 0, "idle": 1, "break": 2}
 
@@ -161,18 +161,13 @@ class BusState:
 
 
 class LinkLine:
-    """The host's end of the serial line of a real-time link: bytes, in the time of the machine.
+    """The host's end of the serial line of a real-time link: bytes, in the time of the machine."""
 
-    A bit takes LINK_BIT_CYCLES cycles, as 12 Mbaud at 60 MHz.
-    """
-
-    def __init__(self, twin: "Twin", to_node: PeerLineHandle, to_host: PeerLineHandle) -> None:
+    def __init__(
+        self, twin: "Twin", bit_cycles: int, to_node: PeerLineHandle, to_host: PeerLineHandle
+    ) -> None:
         self.twin, self.to_node, self.to_host = twin, to_node, to_host
-
-    @property
-    def bit_time(self) -> int:
-        """The bit time of the line for the register link.bit_time, in 1/16 cycle."""
-        return 16 * LINK_BIT_CYCLES
+        self.bit_time = 16 * bit_cycles  # for the register link.bit_time, in 1/16 cycle
 
     def send(self, data: bytes) -> None:
         """Begins to send bytes to the node; no time passes."""
@@ -502,14 +497,16 @@ class Twin:
 
     # real-time link
 
-    def link(self, node: int = 0) -> "LinkLine":
-        """The host's end of the real-time link of a node that was built with HAS_LINK."""
+    def link(self, node: int = 0, bit_cycles: int = LINK_BIT_CYCLES) -> "LinkLine":
+        """The host's end of the real-time link of a node that was built with HAS_LINK. A bit takes
+        `bit_cycles` cycles of the node, as the first call for it says.
+        """
         if self.check_node(node) not in self.links:
             lines = (ctypes.c_void_p * 2)()
-            baud = self.clk_hz / LINK_BIT_CYCLES
+            baud = self.clk_hz / bit_cycles
             self.library.twin_join_link(self.handle, node, self.seed, baud, ctypes.addressof(lines))
             ends = [PeerLineHandle(self.library, int(line or 0), self.now) for line in lines]
-            self.links[node] = LinkLine(self, *ends)
+            self.links[node] = LinkLine(self, bit_cycles, *ends)
         return self.links[node]
 
     # power

@@ -58,7 +58,7 @@ class LinkGateway:
         self.socket.settimeout(timeout_s)
         try:
             request, sender = self.socket.recvfrom(2 * LONGEST_PACKET)
-        except TimeoutError:
+        except (TimeoutError, BlockingIOError):
             return False
         for reply in self.reader.feed(self.line.exchange(sealed(request), self.cycle_s)):
             self.socket.sendto(reply, sender)

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The wires of the real-time link in a node: its settings, its line, its accesses to the register
+bus beside those of the soft core, its state, and its watchdog.
+"""
+
+from moire.bus.cobs import sealed, unstuff
+from moire.bus.link import Link, Spare
+from moire.made.registers import FIELDS, MAP_CRC
+from tb.wiring.node import BIT
+from tb.wiring.test_interlock_wiring import both_on, judge
+
+SESSION = 0xC0FFEE
+MS = 6200  # cycles
+
+
+def address(register, axis=0):
+    block, name = register.split(".")
+    return next(f for f in FIELDS if (f.block, f.register) == (block, name)).address(axis)
+
+
+WRITES = [address("axis.open_command", axis) for axis in (0, 1)]
+READS = [
+    address("node.time_stamp"),
+    address("node.time_stamp") + 4,
+    address("axis.open_command", 1),
+    address("axis.open_command", 0),
+]
+
+
+def set_up(node, **settings):
+    node.write("link.bit_time", 16 * BIT)
+    for n in range(len(READS)):
+        node.write("link.entry_number", n)
+        node.write("link.entry", write=WRITES[n % 2], read=READS[n])
+    node.write("link.session", SESSION)
+    node.write("link.lists", writes=len(WRITES), reads=len(READS))
+    for name, value in settings.items():
+        node.write(f"link.{name}", value)
+    node.write("link.enable", 1)
+    return Link(SESSION, len(WRITES), len(READS))
+
+
+def exchange(node, packet, sent=sealed):
+    """Sends a packet; returns the bytes of the reply, and the changes of the driver enable."""
+    node.watch("link_tx", "link_driver_enable")
+    for byte in sent(packet):
+        node.character("link_rx", byte)
+    node.run(600 * BIT)
+    changes = node.changes()
+    enable = [c for c in changes if c.pin == "link_driver_enable"]
+    heard = bytes(node.characters("link_tx", changes))
+    if enable:
+        tx = [c.cycle for c in changes if c.pin == "link_tx"]
+        assert enable[0].cycle < tx[0] and enable[-1].cycle > tx[-1]
+    return unstuff(heard[1:-1]) if heard else None, [c.value for c in enable]
+
+
+def test_a_request_on_the_line_writes_and_reads_the_registers(node):
+    host = set_up(node)
+    assert node.levels("link_tx", "link_driver_enable") == (1, 0)
+    for values in ([0x0123, 0x4567], [0x7FFF, 0x0001]):
+        content, enable = exchange(node, host.request(0, values, Spare(0)))
+        assert enable == [1, 0]
+        reply = host.reply(content)
+        assert reply.spare == MAP_CRC and not any(reply.refused.values())
+        low, high, second, first = reply.values
+        assert [first, second] == values and high == 0 and 0 < low - reply.time < 100
+        assert [node.read("axis.open_command", axis=axis) for axis in (0, 1)] == values
+    state = dict(built=1, on=1, busy=0, expired=0, session=SESSION)
+    assert node.fields("link.state") == state
+
+
+def test_what_is_refused_is_counted_by_its_cause(node):
+    host = set_up(node, time_window=1000)
+    zero = dict(damaged=0, foreign=0, wrong_length=0, replayed=0)
+    assert node.fields("link.refused") == zero
+    now = node.read("node.time_stamp") & 0xFFFF_FFFF
+    late = host.request(now - 100_000, [1, 2])
+    foreign = Link(SESSION ^ 0x800000, 2, 4).request(0, [1, 2])
+    longer = Link(SESSION, 3, 4).request(0, [1, 2, 3])
+    old = Link(SESSION, 2, 4)
+    old.sequence = 2**31
+    for packet, cause in (
+        (late[:-1] + bytes([late[-1] ^ 1]), "damaged"),
+        (foreign, "foreign"),
+        (longer, "wrong_length"),
+        (old.request(0, [1, 2]), "replayed"),
+    ):
+        assert exchange(node, packet) == (None, [])
+        assert node.fields("link.refused") == zero | {cause: 1}
+        zero[cause] = 1
+    assert exchange(node, late) == (None, [])
+    assert node.fields("link.refused_now") == dict(out_of_time=1, busy=0)
+    assert node.read("link.framing_errors") == 0
+    node.character("link_rx", 0, stop=0)
+    assert node.read("link.framing_errors") == 1
+    assert not any(node.read("axis.open_command", axis=axis) for axis in (0, 1))
+
+
+def test_a_silent_host_stops_all_axes(node):
+    both_on(node)
+    host = set_up(node, watchdog_time=30)
+    for _ in range(2):
+        assert host.reply(exchange(node, host.request(0, [0, 0]))[0])
+        assert node.get("drive_enable") == 3
+    node.run(31 * MS)
+    assert node.read("link.state", "expired") == 1
+    judge(node, 0, "link_watchdog", both=True)
+    node.write("link.enable", 0)
+    assert node.read("link.state", "on") == 0 and node.read("link.state", "expired") == 0
