@@ -37,6 +37,7 @@ RTAPI_MP_INT(simulated, "1: each packet is a servo period of a simulated node, w
 static const int64_t NS_PER_MS = 1000000;
 static const double NS = 1e-9, MS = 1e-3;
 static const int64_t SIMULATED_NS = 60000000000;  // longest wait for a simulated node
+static const int64_t CHECK_NS = 100000000;        // for a reply while the component is loaded
 enum { LEVEL_LOST = 2, LEVEL_GOOD = 1, LEVEL_LIMIT = 10 };
 enum { LEAST_TICKS = 2 };  // from one set-point to the next
 
@@ -85,7 +86,7 @@ static void count_refused(struct link* link) {
 static void take_reply(struct link* link) {
     struct node_pins* pins = &link->pins;
     struct node* of = &link->node;
-    of->time = link->reply.time;
+    node_take_time(of, &link->reply);
     *pins->latency = (double)(carrier_now() - of->sent_at) / (double)NS_PER_MS;
     count_refused(link);
     if (link->started && link->reply.expired) *pins->watchdog_has_bit = 1;
@@ -227,7 +228,8 @@ static bool start(struct link* link, unsigned number) {
         return false;
     }
     uint32_t of = (uint32_t)session[number];
-    if (node_open(&link->node, node[number], (unsigned)axes[number], of)) return true;
+    int64_t patience = simulated ? SIMULATED_NS : CHECK_NS;
+    if (node_open(&link->node, node[number], (unsigned)axes[number], of, patience)) return true;
     rtapi_print_msg(RTAPI_MSG_ERR, "moire: %s: %s\n", node[number], link->node.why);
     return false;
 }
@@ -241,14 +243,13 @@ int rtapi_app_main(void) {
     int failed = links && count ? 0 : -1;
     if (!count) rtapi_print_msg(RTAPI_MSG_ERR, "moire: name a node: loadrt moire node=…\n");
     if (!failed) memset(links, 0, count * sizeof *links);
-    for (unsigned n = 0; n < count && !failed; n++)
-        failed = start(&links[n], n) ? export_link(&links[n], n) : -1;
-    if (failed) {
-        hal_exit(component);
-        return -1;
-    }
-    hal_ready(component);
-    return 0;
+    unsigned opened = 0;
+    for (; opened < count && !failed; opened++)
+        failed = start(&links[opened], opened) ? export_link(&links[opened], opened) : -1;
+    if (!failed) return hal_ready(component);
+    for (unsigned n = 0; n < opened; n++) carrier_close(&links[n].node.carrier);
+    hal_exit(component);
+    return -1;
 }
 
 void rtapi_app_exit(void) {

@@ -3,8 +3,13 @@
 
 #include <stdio.h>
 
-enum { TRIES = 20, TRY_NS = 100000000 };  // of an exchange of the check
+enum { TRIES = 20 };  // of an exchange of the check
 static const double NS = 1e-9;
+
+void node_take_time(struct node* node, const struct link_reply* reply) {
+    node->time = reply->time;
+    node->time_at = node->sent_at;
+}
 
 static bool misfit(struct node* node, const char* why) {
     snprintf(node->why, sizeof node->why, "%s", why);
@@ -20,9 +25,9 @@ static bool read_register(struct node* node, uint32_t address, uint32_t* value) 
         size_t length = packet_request(&node->link, node->time, nothing, address, 0, packet);
         node->sent_at = carrier_now();
         carrier_send(&node->carrier, packet, length);
-        while ((length = carrier_receive(&node->carrier, packet, node->sent_at + TRY_NS)))
+        while ((length = carrier_receive(&node->carrier, packet, node->sent_at + node->patience)))
             if (packet_reply(&node->link, packet, length, &reply)) {
-                node->time = reply.time;
+                node_take_time(node, &reply);
                 *value = reply.spare;
                 return true;
             }
@@ -56,8 +61,10 @@ static bool check(struct node* node) {
     return true;
 }
 
-bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session) {
+bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session,
+               int64_t patience) {
     node->axes = axes;
+    node->patience = patience;
     node->link = (struct link_session){
         .session = session,
         .writes = WRITES_FIXED + axes * WRITES_EACH,
@@ -71,6 +78,6 @@ bool node_open(struct node* node, const char* where, unsigned axes, uint32_t ses
 }
 
 uint32_t node_time(const struct node* node) {
-    double seconds = (double)(carrier_now() - node->sent_at) * NS;
+    double seconds = (double)(carrier_now() - node->time_at) * NS;
     return node->time + (uint32_t)(int64_t)(seconds * node->clk_hz);
 }

@@ -19,21 +19,27 @@ struct node {
     struct link_session link;
     unsigned axes;
     double clk_hz;
-    double tick;      // cycles of a servo tick
-    uint32_t time;    // in the last reply, cycles
-    int64_t sent_at;  // of the request that it answers, ns
-    char why[160];    // why it cannot be used, one sentence
+    double tick;       // cycles of a servo tick
+    uint32_t time;     // in the last reply, cycles
+    int64_t time_at;   // ns, when the request was sent that it answers
+    int64_t sent_at;   // ns, of the last request
+    int64_t patience;  // ns, with each request of the check
+    char why[160];     // why it cannot be used, one sentence
 };
 
 // Opens the carrier to a node with `axes` axes and checks that the node has this session and fits
-// the driver; false with the reason in `why`. Waits for replies: not for a realtime thread.
-bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session);
+// the driver; false with the reason in `why`. Waits for each reply for `patience` ns, several
+// times: not for a realtime thread.
+bool node_open(struct node* node, const char* where, unsigned axes, uint32_t session,
+               int64_t patience);
 
-// The first word of a register of an axis in the lists of a node; of a register of the node, axis
-// 0.
+// The first word of a register in the lists of a node; `axis` is 0 for a register of the node.
 static inline unsigned list_word(struct list_place place, unsigned axes, unsigned axis) {
     return place.fixed + axes * place.each + axis * place.width;
 }
+
+// Takes the time of the node from the reply to the last request.
+void node_take_time(struct node* node, const struct link_reply* reply);
 
 // Time of the node in cycles when a request that is sent now will arrive.
 uint32_t node_time(const struct node* node);

@@ -6,6 +6,7 @@ Runs with the Python of LinuxCNC, in the folder of the configuration. It obeys t
 steps.json in their order and writes report.json: for each step done whether it succeeded, the
 position afterwards, and the error messages so far.
 
+    patience SECONDS   how long each further step may take, on the clock of the computer
     on                 resets the emergency stop, switches the machine on
     home               homes all joints
     start PROGRAM      runs a G-code file
@@ -23,7 +24,7 @@ from pathlib import Path
 
 import linuxcnc
 
-PATIENCE_S = 120.0  # of each step, on the clock of the computer
+PATIENCE_S = 120.0  # of each step at first
 LOOK_S = 0.01
 STEADY_LOOKS = 20  # in a row, at a state that lasts
 
@@ -34,6 +35,11 @@ class Operator:
     def __init__(self):
         self.command, self.status = linuxcnc.command(), linuxcnc.stat()
         self.errors, self.messages = linuxcnc.error_channel(), []
+        self.patience_s = PATIENCE_S
+
+    def patience(self, seconds):
+        self.patience_s = seconds
+        return True
 
     def look(self):
         """Reads the status and collects the messages."""
@@ -43,7 +49,7 @@ class Operator:
 
     def wait(self, condition):
         """Whether the condition has come true in time."""
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + self.patience_s
         while time.monotonic() < end:
             self.look()
             if condition():

@@ -27,7 +27,7 @@ RULES = Path("/usr/share/linuxcnc/Makefile.modinc")
 MESSAGES, USUAL_PORT = Path("/usr/share/linuxcnc/linuxcnc.nml"), 5005
 PRIVATE = Path("/mnt")  # everything of a run, in its own namespace
 PLAIN_USER = 65534  # nobody: LinuxCNC refuses to run as root
-LONGEST_S = 300
+LONGEST_S = 3600
 
 
 def missing() -> str | None:

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import numpy
 from numpy.typing import NDArray
 
-REST, STILL_MM, NEAR_MM = 40, 1e-6, 0.01  # rows of a path at rest, moved less, near a place
+REST, STILL_MM, NEAR_MM = 40, 1e-6, 0.02  # rows of a path at rest, moved less, near a place
 
-DWELL, FIRST_LINE = "G4 P0.03", 5
+DWELL, FIRST_LINE = "G4 P0.1", 5
 
 Points = NDArray[numpy.float64]  # n rows of X, Y, Z
 Point = tuple[float, float, float]
@@ -130,12 +130,12 @@ class Program:
         ]
         return "\n".join(lines) + "\n"
 
-    def errors(self, path: Points) -> tuple[Points, Points]:
+    def errors(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
         """Distances in mm of a path from the program while it was followed, and the path after
-        that. The path rests at the start and at the end of the program for REST rows at least;
-        ValueError if it does not do so in this order.
+        that. The path rests at the start and at the end of the program for REST rows at least, that
+        is, it moves by less than still_mm; ValueError if it does not do so in this order.
         """
-        resting = numpy.linalg.norm(path[REST:] - path[:-REST], axis=1) < STILL_MM
+        resting = numpy.linalg.norm(path[REST:] - path[:-REST], axis=1) < still_mm
         began = first(resting & at(path, self.start), 0, "the start")
         moved = first(~at(path, self.start), began, "a motion")
         ended = first(resting & at(path, self.place), moved, "the end")

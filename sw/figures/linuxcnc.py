@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of the driver for LinuxCNC: real G-code on the simulated mill, and the processor time of
+the driver. They need LinuxCNC: `make linuxcnc`.
+"""
+
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+from figures.common import Absent, Figure, Quick, console
+from linuxcnc_config.headless import RULES, SOURCES, missing, run
+from linuxcnc_config.programs import PROGRAMS
+from linuxcnc_config.twin_mill import TwinMill
+from moire.errors import MoireError
+from twin.build import ROOT
+
+BENCH = SOURCES / "thread_bench.c"
+PARTS = ("axis", "carrier", "node", "node_clock", "packet")
+OPTIONS = ("-O2", "-std=gnu11", "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-Drealtime")
+MEDIAN_US = 10.0
+PERIODS = 100_000
+TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
+PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
+STILL_MM = 0.002  # a stepper that settles on its scale of 1 um
+BLEND_MM = {"corners": 0.05}  # tolerance of its G64
+
+
+@cache
+def errors_mm(names: Sequence[str], seed: int) -> dict[str, float]:
+    """{program: largest distance of the true path from it}; a program that did not end is not in
+    it.
+    """
+    if reason := missing():
+        raise Absent(reason)
+    steps: list[list[str | float]] = [["patience", PATIENCE_S], ["on"], ["home"]]
+    for name in names:
+        steps += [["start", f"{name}.ngc"], ["finish"]]
+    texts = {f"{name}.ngc": PROGRAMS[name].text() for name in names}
+    with tempfile.TemporaryDirectory() as folder, TwinMill(seed) as mill:
+        ran = run(mill.configuration(), Path(folder), steps, texts)
+        path = mill.true_path()
+    if not ran.report:
+        raise MoireError(f"LinuxCNC did not run: {ran.printed[-500:]}")
+    ended = [row["done"] for row in ran.report if row["step"] == ["finish"]]
+    found: dict[str, float] = {}
+    for name in [name for name, done in zip(names, ended) if done]:
+        distances, path = PROGRAMS[name].errors(path, STILL_MM)
+        found[name] = float(distances.max())
+        console.print(f"{name}: largest distance from the path {1000 * found[name]:.2f} um")
+    return found
+
+
+def linuxcnc_programs_failed(names: Sequence[str] = tuple(PROGRAMS), seed: int = 1) -> float:
+    found = errors_mm(tuple(names), seed)
+    return sum(
+        name not in found or found[name] > TOLERANCE_MM + BLEND_MM.get(name, 0) for name in names
+    )
+
+
+def linuxcnc_mill_um(names: Sequence[str] = ("circle",), seed: int = 1) -> float:
+    found = errors_mm(tuple(names), seed)
+    if missed := set(names) - found.keys():
+        raise MoireError(f"{', '.join(missed)} did not end")
+    return 1000 * max(found.values())
+
+
+def thread_us_max(periods: int = PERIODS) -> float:
+    if not RULES.exists():
+        raise Absent("linuxcnc-uspace-dev is not installed: make linuxcnc")
+    program = ROOT / "build" / "linuxcnc" / "thread_bench"
+    program.parent.mkdir(parents=True, exist_ok=True)
+    sources = [BENCH, *(SOURCES / f"{name}.c" for name in PARTS)]
+    folders = [f"-I{SOURCES}", "-I/usr/include/linuxcnc"]
+    links = ["-lz", "-lm", "-lpthread"]
+    command = ["gcc", *OPTIONS, *folders, *map(str, sources), "-o", str(program), *links]
+    subprocess.run(command, check=True)
+    out = subprocess.run([program, str(periods), "3"], check=True, capture_output=True, text=True)
+    median, most = (float(word) for word in out.stdout.split())
+    console.print(f"read + write of 3 axes: median {median:.2f} us, largest {most:.2f} us")
+    if median > MEDIAN_US:
+        raise MoireError(f"the median, {median:.2f} us, is above {MEDIAN_US:g} us")
+    return most
+
+
+FIGURES = {
+    "linuxcnc_programs_failed": Figure(
+        linuxcnc_programs_failed,
+        "programs",
+        "G-code that LinuxCNC runs on the simulated three-axis mill (RTL, firmware, steppers, 1 um "
+        "scales): circle, pocket, helix, blended corners: not ended, or further than 20 um from "
+        "their paths",
+        "0",
+        Quick({"names": ("circle",)}, "the circle"),
+        0,
+    ),
+    "linuxcnc_mill_um": Figure(
+        linuxcnc_mill_um,
+        "um",
+        "largest distance of the true path of that mill from a circle of 5 mm radius at 600 mm/min "
+        "run by LinuxCNC",
+        "<= 5",
+        Quick({}, "the whole figure"),
+    ),
+    "thread_us_max": Figure(
+        thread_us_max,
+        "us",
+        "largest processor time of read and write of the driver for LinuxCNC in a servo period, 3 "
+        "axes, the system calls of the loopback included, of 10^5 (the median must be 10 us at "
+        "most)",
+        "<= 30",
+        Quick({"periods": 2000}, "2000 periods", bound=""),
+    ),
+}

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// thread_bench.c -- the driver's read and write functions, called as the servo thread calls
+// them, without LinuxCNC: how much processor time they take. A thread of its own answers as a node.
+//
+//     thread_bench PERIODS AXES        prints the median and the largest time of read + write,
+//     us
+#include <pthread.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/mman.h>
+#include <zlib.h>
+
+#include "moire.c"
+
+static void (*functions[2])(void*, long);
+static void* arguments[2];
+static int exported;
+
+int hal_init(const char* name) { return name ? 1 : -1; }
+int hal_ready(int id) { return id - 1; }
+int hal_exit(int id) { return id - 1; }
+void* hal_malloc(long size) { return calloc(1, (size_t)size); }
+int hal_pin_new(const char* name, hal_type_t type, hal_pin_dir_t direction, void** pointer,
+                int id) {
+    *pointer = calloc(1, 8);
+    return !(name && type && direction && id == 1);
+}
+int hal_export_funct(const char* name, void (*function)(void*, long), void* argument, int floats,
+                     int reentrant, int id) {
+    functions[exported] = function;
+    arguments[exported++] = argument;
+    return !(name && floats && !reentrant && id == 1);
+}
+void rtapi_print_msg(msg_level_t level, const char* format, ...) {
+    va_list list;
+    va_start(list, format);
+    if (level <= RTAPI_MSG_ERR) vfprintf(stderr, format, list);
+    va_end(list);
+}
+int rtapi_snprintf(char* text, unsigned long size, const char* format, ...) {
+    va_list list;
+    va_start(list, format);
+    int length = vsnprintf(text, size, format, list);
+    va_end(list);
+    return length;
+}
+
+enum { CLK_HZ = 60000000, TICK = 15000, STREAMING = 2, SERVO_NS = 1000000, WARM = 100 };
+
+static uint32_t register_of(uint32_t address) {
+    switch (address) {
+    case NODE_BASE + NODE_MAP_CRC: return MAP_CRC;
+    case NODE_BASE + NODE_BUILD: return (uint32_t)axes[0] << NODE_BUILD_AXES_SHIFT;
+    case NODE_BASE + NODE_CLK_HZ: return CLK_HZ;
+    case NODE_BASE + NODE_TICK_PERIOD: return TICK;
+    default: return AXIS_BUILT_SET_POINTS_MASK;
+    }
+}
+
+// Answers each request at once.
+static void* answer(void* argument) {
+    int file = *(int*)argument;
+    uint32_t request[PACKET_LONGEST_WORDS], reply[PACKET_LONGEST_WORDS] = {0};
+    size_t reads = READS_FIXED + (size_t)axes[0] * READS_EACH;
+    size_t words = PACKET_REPLY_WORDS + reads + PACKET_REPLY_END_WORDS;
+    for (uint32_t time = 0;; time += CLK_HZ / 1000) {
+        struct sockaddr_in host;
+        socklen_t size = sizeof host;
+        ssize_t got = recvfrom(file, request, sizeof request, 0, (struct sockaddr*)&host, &size);
+        if (got <= 0) return NULL;
+        const uint32_t* end = request + got / 4 - PACKET_REQUEST_END_WORDS - 1;  // before its CRC
+        reply[PACKET_REPLY_IDENTITY] =
+            (request[PACKET_REQUEST_IDENTITY] & ~0xFFu) | PACKET_KIND_REPLY;
+        reply[PACKET_REPLY_SEQUENCE] = request[PACKET_REQUEST_SEQUENCE];
+        reply[PACKET_REPLY_TIME] = time;
+        for (unsigned n = 0; n < (unsigned)axes[0]; n++)
+            reply[PACKET_REPLY_WORDS + list_word(READ_AXIS_STREAM_STATE, (unsigned)axes[0], n)] =
+                STREAMING;
+        reply[words - 1] = register_of(end[PACKET_REQUEST_END_SPARE]);
+        reply[words] = (uint32_t)crc32(0, (uint8_t*)reply, (unsigned)(4 * words));
+        sendto(file, reply, 4 * words + 4, 0, (struct sockaddr*)&host, size);
+    }
+}
+
+static double used_us(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return (double)now.tv_sec * 1e6 + (double)now.tv_nsec * 1e-3;
+}
+
+static int by_size(const void* a, const void* b) {
+    double difference = *(const double*)a - *(const double*)b;
+    return (difference > 0) - (difference < 0);
+}
+
+int main(int count, char** words) {
+    if (count != 3) return 2;
+    size_t periods = (size_t)atol(words[1]);
+    axes[0] = atoi(words[2]);
+    session[0] = 4711;
+    int file = socket(AF_INET, SOCK_DGRAM, 0);
+    struct sockaddr_in here = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t size = sizeof here;
+    if (bind(file, (struct sockaddr*)&here, size)) return 1;
+    getsockname(file, (struct sockaddr*)&here, &size);
+    char place[40];
+    snprintf(place, sizeof place, "udp:127.0.0.1:%d", ntohs(here.sin_port));
+    node[0] = place;
+    pthread_t thread;
+    pthread_create(&thread, NULL, answer, &file);
+    if (rtapi_app_main()) return 1;
+    for (int n = 0; n < axes[0]; n++) *links->axis[n].pins.scale = 250;
+    mlockall(MCL_CURRENT | MCL_FUTURE);
+    double* times = calloc(periods, sizeof *times);
+    for (size_t n = 0; n < periods + WARM; n++) {
+        struct pollfd reply = {.fd = links->node.carrier.file, .events = POLLIN};
+        if (n) poll(&reply, 1, 1000);
+        double before = used_us();
+        functions[0](arguments[0], SERVO_NS);
+        functions[1](arguments[1], SERVO_NS);
+        if (n >= WARM) times[n - WARM] = used_us() - before;
+        for (int one = 0; one < axes[0] && n == 1; one++) {
+            *links->axis[one].pins.enable = 1;
+            links->axis[one].phase = FOLLOWING;
+        }
+    }
+    for (int n = 0; n < axes[0]; n++)
+        if (links->axis[n].phase != FOLLOWING) return 1;
+    qsort(times, periods, sizeof *times, by_size);
+    printf("%.3f %.3f\n", times[periods / 2], times[periods - 1]);
+    return *links->pins.packet_error_total != 0;
+}
