@@ -15,8 +15,8 @@ from statistics import NormalDist
 from typing import Any, NoReturn
 
 from moire import units
-from moire.cli.values import did_you_mean, near_names
 from moire.errors import BadFile, MoireError
+from moire.nearest import did_you_mean, near_names
 from study import quantities
 from study.machines import MACHINES, Machine, Measure
 from twin.parameters import tables

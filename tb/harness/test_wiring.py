@@ -139,3 +139,16 @@ def test_only_connections_that_differ_from_the_base_are_new(monkeypatch):
     assert [c.port for c in wiring.changed()] == ["sdi"]
     monkeypatch.setattr(wiring, "git", lambda *words: b"")  # git sees no difference
     assert not wiring.changed()
+
+
+def test_faults_of_an_instance_that_the_design_does_not_have_need_a_reason_and_are_not_run():
+    verdicts = wiring.run([RTL / "node.sv"], lambda c: "serial_core" in c.instance)
+    assert verdicts.explained and not verdicts.killed and not verdicts.failures
+
+
+def test_small_diagrams_of_a_design_share_a_build(monkeypatch):
+    sizes = {"node.sv": 300, "relay.sv": 9, "axis.sv": 100, "motion.sv": 1, "relay_bridge.sv": 50}
+    monkeypatch.setattr(wiring, "of_diagram", lambda file: [None] * sizes[file.name])
+    groups = wiring.together(RTL / name for name in sizes)
+    shared = [["node.sv", "axis.sv"], ["motion.sv"], ["relay.sv", "relay_bridge.sv"]]
+    assert [[file.name for file in group] for group in groups] == shared

@@ -171,9 +171,7 @@ def test_registers_are_read_by_name_and_wide_ones_low_word_first():
         "homing": 3,
         "fine": 0,
     }
-    with pytest.raises(
-        UnknownName, match="there is no register 'axis.speed': known are node.map_crc"
-    ):
+    with pytest.raises(UnknownName, match="there is no register 'axis.speed', did you mean axis."):
         axis.node.read_named("axis.speed")
     with pytest.raises(OutOfRange, match="bus.transmit can only be written"):
         axis.node.read_named("bus.transmit")
@@ -288,6 +286,20 @@ def test_a_travel_whose_ends_are_swapped_is_refused_by_the_host():
     axis.set_parameter("travel_high", "-800um")
     axis.load_parameters({"travel_low": "-3mm", "travel_high": "-2mm"})
     assert axis.get_parameter("travel_high").value == -2_000_000
+
+
+def test_a_travel_that_excludes_a_homed_axis_is_refused_by_the_host():
+    node = BusNode()
+    axis = Bus(Rs485Bus(node)).axis()
+    axis.set_parameter("travel_low", "1mm")  # without a zero positions mean nothing
+    axis.set_parameter("travel_low", "-1mm")
+    node.home()
+    with pytest.raises(OutOfRange, match="outside a travel of 1mm to .*: move it inside first"):
+        axis.set_parameter("travel_low", "1mm")
+    with pytest.raises(OutOfRange, match="outside a travel of"):
+        axis.load_parameters({"travel_low": "-1mm", "travel_high": "-0.5mm", "kp": 3})
+    assert node.parameter("travel_low") == -1250 * PERIOD and node.parameter("kp") != 3 << 16
+    axis.set_parameter("travel_low", "0mm")  # within a period of where it is
 
 
 def test_refusals_carry_the_words_of_the_table_and_the_values():
@@ -874,7 +886,7 @@ def test_wrong_values_are_refused_with_what_is_allowed():
     with pytest.raises(UnitError, match="'5mm' is no speed"):
         axis.set_parameter("velocity", "5mm")
     with pytest.raises(
-        UnknownName, match="there is no parameter 'speed': known are period, counts_per_period"
+        UnknownName, match="there is no parameter 'speed': Axis.parameters\\(\\) lists all"
     ):
         axis.get_parameter("speed")
     assert "set_parameter" not in node.executed

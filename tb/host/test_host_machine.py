@@ -16,6 +16,7 @@ from moire.client import axis as blocking_axis
 from moire.client import remedies
 from moire.errors import BadFile, BusError, MotionFailed, PortError, Refused, UnknownName
 from moire.made import bus_tables
+from tables import faults
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
@@ -276,6 +277,13 @@ def test_a_name_of_a_parameter_in_a_remedy_is_one_that_exists():
             words = {word.strip(".,;:()'") for word in words}
             known = remedies.NAMED | fields | {"encoder_events"}
             assert words <= known, words - known
+
+
+def test_the_page_of_faults_is_fresh_and_has_every_name():
+    assert faults.main(["--check"]) == 0
+    text = faults.PAGE.read_text()
+    for found, _ in remedies.TABLES.values():
+        assert all(f"| `{name}` | " in text for name in found)
 
 
 # ------------------------------------------------------------------ moire.connect

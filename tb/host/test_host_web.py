@@ -724,6 +724,19 @@ def test_there_are_only_so_many_connections(served, monkeypatch):
             assert first.done("GET", "/api")
 
 
+def test_a_websocket_counts_until_it_has_ended(served, monkeypatch):
+    monkeypatch.setattr(door, "MOST_CONNECTIONS", 2)
+    hosts = lambda: served.door.crowd.hosts.total()
+    for _ in range(3):
+        with served.stream() as one, served.stream() as other:
+            assert one.request("GET", "/api") and other.request("GET", "/api") and hosts() == 2
+            with served.raw(b"GET /api HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n") as third:
+                assert all_received(third) == b""
+        served.wait_until(lambda: hosts() == 0)
+    with served.http() as client:
+        client.done("GET", "/api")
+
+
 def test_one_host_of_the_network_gets_only_a_part_of_the_connections():
     crowd = door.Crowd(None)
     crowd.hosts.update({"10.0.0.9": door.MOST_OF_ONE_HOST, "127.0.0.1": door.MOST_OF_ONE_HOST})

@@ -15,9 +15,10 @@ from moire.cli import commands
 from moire.cli.commands import MODULES, SECTIONS
 from moire.cli.files import OutputError
 from moire.cli.options import COMMON, GIVEN, OF_THE_CALL, OF_THE_PORT, Common, Options
-from moire.cli.values import did_you_mean, marked, near_names
+from moire.cli.values import marked
 from moire.description import Description
 from moire.errors import MoireError
+from moire.nearest import did_you_mean, near_names
 
 EXAMPLES = """\
 Several commands in one call have -- between them:

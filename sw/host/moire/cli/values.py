@@ -2,8 +2,7 @@
 """The types of the values on the command line. Each refuses a wrong text in one sentence."""
 
 import re
-from collections.abc import Callable, Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
@@ -14,9 +13,9 @@ from moire import units
 from moire.bus.protocol import ADDRESSES
 from moire.client.values import HOME_METHODS
 from moire.errors import MoireError, OutOfRange, UnitError
+from moire.nearest import unknown
 
 MARK = " "  # in front of a value below zero, so that click takes it for no option
-MOST_NAMES = 12  # a longer list of names is not printed in an error
 
 
 def marked(argument: str) -> str:
@@ -50,7 +49,7 @@ class Name(Value):
     def look_up(self, text: str) -> str:
         """The name itself, or OutOfRange with the names that look like it."""
         if text not in self.known:
-            raise OutOfRange(unknown(self.what, text, self.known, self.listed_by))
+            raise OutOfRange(unknown(self.what, text, self.known, f"'moire {self.listed_by}'"))
         return text
 
     def shell_complete(
@@ -68,28 +67,6 @@ class File(Value):
     ) -> list[CompletionItem[str]]:
         """Leave the completion to the shell, which knows the files."""
         return [CompletionItem(incomplete, type="file")]
-
-
-def near_names(name: str, known: Iterable[str]) -> list[str]:
-    """The known names that look like a name."""
-    return get_close_matches(name, known)
-
-
-def did_you_mean(near: Sequence[str]) -> str:
-    """The end of a sentence about a name that does not exist; empty if no name looks like it."""
-    if not near:
-        return ""
-    *others, last = near
-    return f", did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
-
-
-def unknown(what: str, name: str, known: Iterable[str], listed_by: str) -> str:
-    """The sentence about a name that does not exist. `listed_by` is the command that lists all."""
-    names = tuple(known)
-    more = did_you_mean(near_names(name, names))
-    if not more and len(names) <= MOST_NAMES:
-        more = f": allowed are {', '.join(names)}"
-    return f"there is no {what} '{name}'" + (more or f": 'moire {listed_by}' lists all")
 
 
 def whole(low: int, high: int | None, sentence: str) -> Callable[[str], int]:

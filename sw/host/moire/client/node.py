@@ -13,6 +13,7 @@ from moire.client.update import Firmware, UpdateState, update
 from moire.client.update import Progress as UpdateProgress
 from moire.errors import OutOfRange, Refused, UnknownName, with_more
 from moire.made.registers import FIELDS, Field
+from moire.nearest import unknown
 
 if TYPE_CHECKING:
     from moire.client.bus import Bus
@@ -138,10 +139,8 @@ def register_fields(name: str) -> list[Field]:
     """The fields of a readable register; raises UnknownName or OutOfRange."""
     fields = [known for known in FIELDS if f"{known.block}.{known.register}" == name]
     if not fields:
-        several = ", ".join(dict.fromkeys(f"{known.block}.{known.register}" for known in FIELDS))
-        raise UnknownName(
-            f"there is no register '{name}': known are {several}, or an address such as 0x400"
-        )
+        known = dict.fromkeys(f"{known.block}.{known.register}" for known in FIELDS)
+        raise UnknownName(unknown("register", name, known, "docs/registers.md"))
     if not any("r" in known.access for known in fields):
         raise OutOfRange(f"the register {name} can only be written")
     return fields

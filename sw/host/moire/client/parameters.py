@@ -119,12 +119,27 @@ class AxisParameters(AxisAccess):
         if (travel := pair(*TRAVEL)) and travel[1].counts < travel[0].counts:
             low, high = (value.written(9) for value in travel)
             raise OutOfRange(f"travel_high ({high}) would lie below travel_low ({low})")
+        if travel is not None:
+            self.check_inside(*(value.value for value in travel))
         for first, choice, second in EXCLUSIVE:
             found = pair(first, second)
             if found and found[0].counts == CHOICES[first].index(choice) and found[1].counts:
                 raise OutOfRange(
                     f"{first} {choice} and {second} {found[1].written(6)} do not go together"
                 )
+
+    def check_inside(self, low: Fraction, high: Fraction) -> None:
+        """Raises OutOfRange when a homed axis is outside this travel (nm), by more than a signal
+        period: every motion would be refused, also the one that leads back.
+        """
+        status = self.status()
+        at = Fraction(status.target_nm)
+        if status.homed and not low - self.period_nm <= at <= high + self.period_nm:
+            place, *ends = map(units.format_length, (at, low, high))
+            raise OutOfRange(
+                f"the axis is at {place}, outside a travel of {ends[0]} to {ends[1]}: move it "
+                "inside first"
+            )
 
     def parameters(self) -> dict[str, ParameterValue]:
         """All parameters, by name."""

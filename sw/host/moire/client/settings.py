@@ -14,6 +14,7 @@ from moire.client.node import Node
 from moire.client.values import ParameterValue, counts_of, one_count, value_of
 from moire.errors import UnknownName
 from moire.made.bus_tables import SETTINGS, Parameter
+from moire.nearest import unknown
 
 NO_PERIOD = Fraction(1)  # no setting is counted in signal periods
 
@@ -21,7 +22,7 @@ NO_PERIOD = Fraction(1)  # no setting is counted in signal periods
 def known(name: str) -> Parameter:
     """The entry of the protocol table; raises UnknownName."""
     if name not in SETTINGS:
-        raise UnknownName(f"there is no setting '{name}': known are {', '.join(SETTINGS)}")
+        raise UnknownName(unknown("setting", name, SETTINGS, "Settings.save()"))
     return SETTINGS[name]
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from moire import units
 from moire.errors import OutOfRange, UnknownName
 from moire.made.bus_tables import PARAMETERS, SETTINGS, Parameter
+from moire.nearest import unknown
 
 FILTERS = 2  # of the servo
 FILTER = ("b0", "b1", "b2", "a1", "a2")  # coefficients of a filter
@@ -109,7 +110,7 @@ def whole(value: object) -> bool:
 def parameter(name: str) -> Parameter:
     """The entry of the protocol table; raises UnknownName."""
     if name not in PARAMETERS:
-        raise UnknownName(f"there is no parameter '{name}': known are {', '.join(PARAMETERS)}")
+        raise UnknownName(unknown("parameter", name, PARAMETERS, "Axis.parameters()"))
     return PARAMETERS[name]
 
 

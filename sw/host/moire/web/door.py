@@ -22,6 +22,7 @@ from typing import Any
 import h11
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.wsproto_impl import WSProtocol
 
 from moire.bus.gateway import Gateway
 from moire.description import Description
@@ -69,6 +70,14 @@ class Crowd:
         of_one = MOST_CONNECTIONS if is_loopback(host) else MOST_OF_ONE_HOST
         return self.hosts.total() >= MOST_CONNECTIONS or self.hosts[host] >= of_one
 
+    def enter(self, host: str) -> None:
+        """One more connection of this host."""
+        self.hosts[host] += 1
+
+    def leave(self, host: str) -> None:
+        """A connection of this host has ended."""
+        self.hosts -= Counter([host])
+
 
 def watch(connection: Any) -> None:
     """Lets the operating system notice that the other end of a connection is lost."""
@@ -99,13 +108,13 @@ class Connection(H11Protocol):
             transport.abort()
             return
         self.host = host
-        self.crowd.hosts[host] += 1
+        self.crowd.enter(host)
         self.await_request()
 
     def connection_lost(self, exc: Exception | None) -> None:
         super().connection_lost(exc)
         self.forget_deadline()
-        self.crowd.hosts -= Counter([self.host] if self.host else [])
+        self.forget_host()
         waits = self.cycle is not None and not self.cycle.response_complete
         if self.peer is not None and (self.peer.given is None or waits):
             self.crowd.bridge.leave(self.peer)
@@ -131,6 +140,12 @@ class Connection(H11Protocol):
         """A request has to be complete soon, whatever arrives meanwhile."""
         if self.deadline is None:
             self.deadline = self.loop.call_later(REQUEST_S, self.transport.abort)
+
+    def forget_host(self) -> None:
+        """The connection has ended, or is a WebSocket now, which counts by itself."""
+        if self.host:
+            self.crowd.leave(self.host)
+            self.host = ""
 
     def forget_deadline(self) -> None:
         """The request is complete, or the connection has ended."""
@@ -173,6 +188,22 @@ class Connection(H11Protocol):
         if self.peer is not None:
             self.crowd.bridge.leave(self.peer)
         super().handle_websocket_upgrade(event)
+        self.forget_host()  # the end of the connection is told to the WebSocket alone
+
+
+class Socket(WSProtocol):
+    """A WebSocket, which counts as the connection of HTTP did with which it began."""
+
+    crowd: Crowd  # of the server, set by WebDoor
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self.host = self.client[0] if self.client else ""
+        self.crowd.enter(self.host)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        super().connection_lost(exc)
+        self.crowd.leave(self.host)
 
 
 class WebDoor:
@@ -191,12 +222,15 @@ class WebDoor:
         self.access = Access(self.kept(token), self.kept(settings.read_token))
         if (settings.certificate is None) != (settings.key is None):
             raise PortError("TLS needs two files: give --certificate FILE and --key FILE")
-        kind = type("Connection", (Connection,), {"crowd": Crowd(self.bridge)})
+        self.crowd = Crowd(self.bridge)
+        of_http, of_websocket = (
+            type(kind.__name__, (kind,), {"crowd": self.crowd}) for kind in (Connection, Socket)
+        )
         config = uvicorn.Config(
             application(Doors(self.bridge, self.access)),
             loop="asyncio",
-            http=kind,
-            ws="wsproto",
+            http=of_http,
+            ws=of_websocket,
             ws_max_size=LONGEST_MESSAGE,
             ws_ping_interval=None,
             ws_ping_timeout=None,

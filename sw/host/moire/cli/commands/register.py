@@ -8,9 +8,10 @@ import click
 
 from moire.cli.parser import moire
 from moire.cli.session import Call
-from moire.cli.values import TEXT, unknown
+from moire.cli.values import TEXT
 from moire.errors import OutOfRange, UnknownName
 from moire.made.registers import FIELDS
+from moire.nearest import unknown
 
 NAMES = tuple(
     dict.fromkeys(f"{field.block}.{field.register}" for field in FIELDS if "r" in field.access)
@@ -56,7 +57,7 @@ def address_of(name: str) -> int | None:
     """The address that a text is; None where it is the name of a register."""
     if not re.match(r"0[xX]|[0-9]", name):
         if name not in NAMES:
-            raise UnknownName(unknown("register", name, NAMES, "register"))
+            raise UnknownName(unknown("register", name, NAMES, "'moire register'"))
         return None
     try:
         return int(name, 0)
