@@ -7,7 +7,8 @@
 // rate     one sample per conversion
 // behaviour  A feature that is not built has no logic, and what it would report is 0. Without
 //          HAS_OWN_CHAIN an interpolation_chain of the node computes the steps of several axes; the
-//          ports chain_... and sample_... connect it. With a chain of its own these outputs are 0.
+//          ports chain_... and sample_... connect it. With a chain of its own these outputs are 0,
+//          but sample_sin and sample_cos.
 // source   S0: interferometer with sine, cosine and comparator outputs
 // model    the models of its blocks; tested together by tb/interpolate/test_feedback_channel.py
 `default_nettype none
@@ -181,7 +182,7 @@ module sine_channel #(
             );
             assign {sin, cos, phase} = {sampled_sin, sampled_cos, tracked_phase};
             assign {chain_setting_written, chain_harmonic_enable, chain_learn} = '0;
-            assign {sample_valid, sample_sin, sample_cos} = '0;
+            assign {sample_valid, sample_sin, sample_cos} = {1'b0, raw_sin, raw_cos};
 
             wire unused = &{
                 1'b0, own_overrun, chain_sampled, chain_sin, chain_cos, chain_rejected,

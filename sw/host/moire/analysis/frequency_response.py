@@ -336,11 +336,8 @@ def measure(
         if low is None:
             return response
         factor = softness(response, low_hz)
-        return joined(
-            recorded(axis, low, wished, records, one_more, lambda: softened(axis, tuning, factor)),
-            response,
-            tuning,
-        )
+        soft = lambda: softened(axis, tuning, factor)
+        return joined(recorded(axis, low, wished, records, one_more, soft), response, tuning)
 
     override = axis.override()
     try:
@@ -383,28 +380,34 @@ def recorded(
     speed_nm_s: float,
     records: int,
     progress: Callable[[], object],
-    meanwhile: Callable[[], AbstractContextManager[None]] = nullcontext,
+    soft: Callable[[], AbstractContextManager[None]] | None = None,
 ) -> Response:
     """The response by some records, each with a motion of its own.
 
-    `meanwhile` is in force while the axis moves evenly and is excited. Gains that change then leave
-    the command as it is, so that friction makes no error.
+    With `soft`, which makes the gains smaller, all motions go up, and the axis comes to their
+    beginning from below with its own gains: then friction has its sign already, and makes no error.
     """
     scope, length = TickScope(axis), len(excitation.values)
     period_s, every = length * excitation.tick_s, excitation.sparse
+    way_nm = speed_nm_s * (SETTLING_PERIODS + PERIODS + 2) * period_s
     scope.load(excitation.values)
     errors, commands = [], []
     for number in range(records):
-        if speed_nm_s:
-            way_nm = speed_nm_s * (SETTLING_PERIODS + PERIODS + 2) * period_s
-            axis.begin_move(nm=way_nm if number % 2 == 0 else -way_nm, by=True)
-            axis.dwell(STARTING_S)
-        with meanwhile(), scope.excited(length):
-            axis.dwell(SETTLING_PERIODS * period_s)
-            scope.start(SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s))
-            axis.dwell((PERIODS + 1) * period_s)
-        if speed_nm_s:
-            axis.stop_and_wait()
+        up = soft is not None or number % 2 == 0
+        if speed_nm_s and soft is not None:
+            if number:
+                axis.move(nm=-1.1 * way_nm, by=True)
+            axis.move(nm=0.1 * way_nm, by=True)
+        with nullcontext() if soft is None else soft():
+            if speed_nm_s:
+                axis.begin_move(nm=way_nm if up else -way_nm, by=True)
+                axis.dwell(STARTING_S)
+            with scope.excited(length):
+                axis.dwell(SETTLING_PERIODS * period_s)
+                scope.start(SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s))
+                axis.dwell((PERIODS + 1) * period_s)
+            if speed_nm_s:
+                axis.stop_and_wait()
         values = scope.read().values
         errors.append(values["error"])
         commands.append(values["command"])
@@ -419,9 +422,9 @@ def recorded(
 
 
 def crossover_hz(response: Response) -> float:
-    """The highest measured frequency at which the open loop is above 1; the lowest one if none."""
-    above = numpy.flatnonzero(numpy.abs(response.open_loop) > 1)
-    return float(response.hz[above[-1] if above.size else 0])
+    """The lowest measured frequency at which the open loop is below 1; the highest one if none."""
+    below = numpy.flatnonzero(numpy.abs(response.open_loop) < 1)
+    return float(response.hz[below[0] if below.size else -1])
 
 
 def softness(response: Response, low_hz: float) -> float:
@@ -457,6 +460,7 @@ def softened(axis: Axis, tuning: Tuning, factor: float) -> Iterator[None]:
             axis.write_parameter(name, round(getattr(tuning, name) * part))
         yield
     finally:
+        axis.stop_if_enabled()  # gains do not change during a motion
         for name in factors:
             axis.write_parameter(name, getattr(tuning, name))
 
@@ -468,17 +472,18 @@ def joined(low: Response, high: Response, tuning: Tuning) -> Response:
     """
     above = high.hz > low.hz[-1] * 1.0001
     servo = tuning.response(low.hz, low.tick_s)
-    together = [
-        numpy.concatenate([ours, theirs[above]])
-        for ours, theirs in (
-            (low.hz, high.hz),
-            (low.plant, high.plant),
-            (1 / (1 + low.plant * servo), high.sensitivity),
-            (low.coherence, high.coherence),
-            (low.error, high.error),
-        )
-    ]
-    return Response(*together, high.tick_s, high.period_nm, high.crest, high.periods)
+    sensitivity = 1 / (1 + low.plant * servo)
+    return Response(
+        numpy.concatenate([low.hz, high.hz[above]]),
+        numpy.concatenate([low.plant, high.plant[above]]),
+        numpy.concatenate([sensitivity, high.sensitivity[above]]),
+        numpy.concatenate([low.coherence, high.coherence[above]]),
+        numpy.concatenate([low.error, high.error[above]]),
+        high.tick_s,
+        high.period_nm,
+        high.crest,
+        high.periods,
+    )
 
 
 # ------------------------------------------------------------------ model
@@ -538,7 +543,7 @@ def fit(response: Response) -> MeasuredPlant:
             ratio = numpy.log(modelled(values, response.tick_s, has_mode).response(hz) / points)
         turn = (ratio.imag + math.pi) % (2 * math.pi) - math.pi
         parts = numpy.concatenate([ratio.real * weight, turn * weight])
-        return numpy.nan_to_num(parts, nan=1e3, posinf=1e3, neginf=-1e3)
+        return numpy.asarray(numpy.nan_to_num(parts, nan=1e3, posinf=1e3, neginf=-1e3), float)
 
     def best(starts: list[list[float]], has_mode: bool) -> tuple[Array, Array]:
         fits = [least_squares(lambda v: misfit(v, has_mode), numpy.log(start)) for start in starts]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from moire.analysis import report
 from moire.analysis.frequency_response import MeasuredPlant, Response
 from moire.analysis.tune import (
+    Filter,
     NotTuned,
     Plant,
     Tuning,
@@ -89,9 +90,7 @@ def response_to_step(
     return step(plant, tuning, max(60, round(duration_s / plant.tick_s)))
 
 
-def fastest(
-    plant: Plant, margin_degree: float, filters: Sequence[tuple[int, int, int, int, int]]
-) -> Tuning:
+def fastest(plant: Plant, margin_degree: float, filters: Sequence[Filter]) -> Tuning:
     """The gains with the largest bandwidth that keeps the margins; raises NotTuned without any."""
     for bandwidth_hz in numpy.geomspace(0.12 / plant.tick_s, 1.0, TRIED).tolist():
         try:
@@ -120,7 +119,7 @@ def of(
     has a resonance and the axis filters.
     """
     found = [judged(plant, IN_FORCE, current)]
-    wished = [(GAINS, ())]
+    wished: list[tuple[str, tuple[Filter, ...]]] = [(GAINS, ())]
     if has_filters and plant.resonance_hz is not None:
         wished.append((NOTCHED, (notch(plant.resonance_hz, plant.tick_s),)))
     refusals = []

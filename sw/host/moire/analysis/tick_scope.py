@@ -158,7 +158,7 @@ class TickScope:
     def field(self, name: str) -> int:
         """A field of the node's registers, by register and field with a dot."""
         field = NODE_FIELDS[name]
-        return field.value(self.node.read_register(field.address()))
+        return int(field.value(self.node.read_register(field.address())))
 
     def setting(self) -> Setting:
         """The setting of the last recording, whoever began it."""
