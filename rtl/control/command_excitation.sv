@@ -69,11 +69,13 @@ module command_excitation #(
     wire unused = &{1'b0, store_at, at};
 
 `ifdef FORMAL
+    wire signed [47:0] bound = $signed({33'd0, limit});
+    wire signed [47:0] example = 48'sd5;
     always_comb begin
         if (!adds)
             assert (excited == result);
-            else assert (excited <= 48'(most) && excited >= -48'(most));
-        cover (adds && excited == 48'sd5 && result == 48'sd3 && !first);
+            else assert (excited <= bound && excited >= -bound);
+        cover (adds && excited == example && result != example && !first);
     end
 `endif
 endmodule

@@ -35,6 +35,7 @@ from figures.synthesis import SynthesisError, placed, run, yosys
 from firmware import build as firmware
 
 OUT = ROOT / "build" / "boards"
+NOTE = "note"  # of what the bitstream in a folder was made of
 PLACED, FILLED = "placed", "filled"  # files of nextpnr: with the placeholder, with the firmware
 KINDS = {  # of cells of a 7-series part, by the beginning of their names
     "LUT": "LUT",
@@ -131,7 +132,10 @@ def pinned(design: Design, folder: Path) -> list[str | Path]:
 
 
 def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float, dict[str, Any]]:
-    """(MHz, utilization) after place and route; a clock that is not reached is a result."""
+    """(MHz, utilization) after place and route; a clock that is not reached is a result. Whatever
+    was placed in this folder is replaced, so its note goes.
+    """
+    (folder / NOTE).unlink(missing_ok=True)
     by, mhz = placer(design), design.board.node_hz / 1e6
     written = by.made(folder.relative_to(ROOT) / PLACED)
     return placed(netlist, by.nextpnr, chip(design), mhz, seed, *pinned(design, folder), *written)
@@ -223,12 +227,12 @@ class Note:
 
     @classmethod
     def read(cls, folder: Path) -> "Note":
-        file = folder / "note"
+        file = folder / NOTE
         lines = file.read_text().split() if file.is_file() and (folder / PLACED).is_file() else []
         return cls(*lines[:3])
 
     def write(self, folder: Path) -> None:
-        (folder / "note").write_text(f"{self.placement} {self.seed} {self.program}\n")
+        (folder / NOTE).write_text(f"{self.placement} {self.seed} {self.program}\n")
 
 
 def program_hash(design: Design, folder: Path) -> str:
@@ -241,7 +245,6 @@ def program_hash(design: Design, folder: Path) -> str:
 def placed_again(design: Design, folder: Path, seed: int, say: Callable[[str], None]) -> None:
     """Synthesis and placement; a missed clock is refused."""
     node_mhz = design.board.node_hz / 1e6
-    (folder / "note").unlink(missing_ok=True)
     say(f"--- {design.name}: synthesis")
     netlist = synthesise(design, folder)
     say(f"--- {design.name}: place and route for {node_mhz:g} MHz")

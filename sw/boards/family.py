@@ -44,6 +44,7 @@ class Family:
     package_pins: Callable[[str, str], frozenset[str]]  # of a device and package; empty: unknown
     placer: Placer | None  # None: no open tool places it
     bitstream: str = "moire.bit"
+    appendable: bool = True  # whether a firmware may follow the bitstream in its file
     script: str = ""  # for the tool of the vendor, where there is no placer
     fetched: str = ""  # target of make that fetches its tools
     has_tools: Callable[[], bool] = lambda: True  # whether they are there
@@ -173,6 +174,7 @@ FAMILIES = {
                 contents=block_ram.GOWIN,
             ),
             bitstream="moire.fs",
+            appendable=False,  # it is a text
             fetched="gowin",
             has_tools=gowin.present,
         ),

@@ -80,6 +80,7 @@ def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
         "AXES": len(machine.axes),
         "FILTERS": machine.filters,
         "SEGMENTS": machine.segments,
+        "SCOPE_WORDS": machine.scope_words,
         "HAS_DRIVE": mask(machine, "drive"),
         **{name: mask(machine, drive) for drive, name in DRIVES.items()},
         **{name: mask(machine, feature) for feature, (name, _) in FEATURES.items()},
@@ -242,6 +243,11 @@ def check_part(board: Board, machine: Machine, needed: size.Size) -> None:
         reader = "relay" if machine.orders else "serial core"
         if missing := [name for name in FLASH if name not in board.on_board]:
             raise Misfit(f"{machine.file}: a {reader} needs {missing[0]}, {board.file} has none")
+    if machine.core == "serial" and not part.family.appendable:
+        raise Misfit(
+            f"{machine.file}: a serial core has its firmware behind the bitstream, which is a text "
+            f"for {part.name} of {board.file}"
+        )
     cycles = board.node_hz // TICK_HZ
     if (taken := size.tick_cycles(machine)) > cycles:
         raise Misfit(

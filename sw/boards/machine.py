@@ -108,6 +108,8 @@ RELAY_SIGNALS = {
 }
 SIGNALS = AXIS_SIGNALS | NODE_SIGNALS | RELAY_SIGNALS
 GROUPS = sorted({signal.group for signal in SIGNALS.values()})
+SCOPE_WORDS = [1 << n for n in range(8, 17)]  # of the recorder of ticks
+SCOPE_IMAGES = ("axis", "stream")  # whose firmware has its requests
 MOST_ORDERS = 16  # of a relay whose timing and size are known
 
 
@@ -167,6 +169,7 @@ class Machine:
     address: int  # on the bus, where the board has no switches
     filters: int
     segments: int
+    scope_words: int  # memory of the recorder of ticks; 0: none
     axes: list[Axis]
     peripherals: list[str]
     unused: list[str]  # signals of the node that are not connected
@@ -304,6 +307,16 @@ def check(machine: Machine) -> None:
                 f"{file}: [node] {feature} = {size}, but "
                 f"{f'axis {with_it[0]} has' if with_it else 'no axis has'} the feature {feature}"
             )
+    if machine.scope_words and machine.scope_words not in SCOPE_WORDS:
+        raise Misfit(
+            f"{file}: [node] scope_words = {machine.scope_words} must be 0 or a power of two from "
+            f"{SCOPE_WORDS[0]} to {SCOPE_WORDS[-1]}"
+        )
+    if machine.scope_words and machine.image not in SCOPE_IMAGES:
+        raise Misfit(
+            f"{file}: [node] scope_words needs image {' or '.join(SCOPE_IMAGES)}: "
+            f"{machine.image} does not record ticks"
+        )
 
 
 def names() -> list[str]:
@@ -342,6 +355,7 @@ def load(path: Path) -> Machine:
         address=1 if is_relay else kind.take("address", int),
         filters=0 if is_relay else kind.take("filters", int, 0),
         segments=0 if is_relay else kind.take("segments", int, 0),
+        scope_words=0 if is_relay else kind.take("scope_words", int, 0),
         axes=[axis_of(row) for row in table.rows("axis")],
         peripherals=[] if is_relay else kind.chosen("peripherals", PERIPHERALS),
         unused=kind.chosen("unused", RELAY_SIGNALS if is_relay else NODE_SIGNALS),

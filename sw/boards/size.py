@@ -27,6 +27,7 @@ MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
 SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
+SCOPE_STEP_WORDS, WAVEFORM = 512, 4  # recorder of ticks: words of a block; its excitation
 # On an iCE40: the node of four axes that count in logic cells, the LUT4 by which netlists of four
 # and three of them differ, and the queue of an axis' captures
 COUNTING_NODE, COUNTING_AXIS = MEASURED["node_up5k_lc"], 562
@@ -72,6 +73,8 @@ def ecp5_block_ram(machine: Machine) -> int:
     found += own + -(-(count("harmonics") - own) // HARMONICS_AXES)
     if count("velocity"):
         found += MICROCODE + ENGINE * -(-len(axes) // ENGINE_AXES)
+    if machine.scope_words:
+        found += -(-machine.scope_words // SCOPE_STEP_WORDS) + WAVEFORM
     return found
 
 

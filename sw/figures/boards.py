@@ -107,10 +107,18 @@ def mill_pct(board: str, packs: bool = True) -> float:
     return 100 * used / available
 
 
-def mill(board: str, words: str, bound: str) -> Figure:
+def board_mill_i5_pct(packs: bool = True) -> float:
+    return mill_pct("colorlight_i5", packs)
+
+
+def board_mill_tang_pct(packs: bool = True) -> float:
+    return mill_pct("tang_nano_20k", packs)
+
+
+def mill(measure: Callable[..., float], words: str, bound: str) -> Figure:
     """The figure of the mill on a board."""
     return Figure(
-        partial(mill_pct, board),
+        measure,
         "%",
         f"share of the LUT of {words} that the three-axis mill takes (steppers, A/B/Z scales with "
         "index, homing, limits, firmware in block RAM), after packing by nextpnr, nothing placed",
@@ -121,8 +129,8 @@ def mill(board: str, words: str, bound: str) -> Figure:
 
 
 FIGURES = {
-    "board_mill_i5_pct": mill("colorlight_i5", "a Colorlight i5 (LFE5U-25F)", "<= 50"),
-    "board_mill_tang_pct": mill("tang_nano_20k", "a Tang Nano 20K (GW2AR-18)", "<= 70"),
+    "board_mill_i5_pct": mill(board_mill_i5_pct, "a Colorlight i5 (LFE5U-25F)", "<= 50"),
+    "board_mill_tang_pct": mill(board_mill_tang_pct, "a Tang Nano 20K (GW2AR-18)", "<= 70"),
     "boards_failed": Figure(
         boards_failed,
         "builds",

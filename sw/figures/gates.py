@@ -5,30 +5,34 @@ builds it, in the twin.
 The netlist is that of rtl/node.sv with the parameters, the synthesis and the firmware of `make
 board`; only the clock is slower, and the top with PLL and pins is not there. A netlist of S3 homes
 to the index of its scale and moves. The iCE40 boards have no drives: there the counter box captures
-the index of an axis that something else pushes, and shows when it is at the target.
+the index of an axis that something else pushes, and shows where it is.
 """
 
 import random
 from collections.abc import Callable, Mapping, Sequence
 
 from boards import board as boards
+from boards import build as boards_build
 from boards import machine as machines
 from boards.fit import Design, fit
+from boards.size import firmware_stem
 from experiments.s3_zero import CLK_HZ, COUNT_M, SETTINGS, Motor
 from figures.common import Figure, Quick, console
-from figures.synthesis import SynthesisError, elaborated, source_of
+from figures.synthesis import SynthesisError, yosys
 from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport, build
 from twin.netlist import NetlistError
-from twin.nodes.twin import BAUD, Axis, Node
+from twin.nodes.twin import Axis, Node
 
 BY_TWIN = ("CLK_HZ", "AXES", "FIRMWARE")  # parameters of the node that the twin sets itself
 TARGET_MM = 0.5
 NEAR_UM = 2.0  # two counts of the scale
-BOX_HZ, BOX_BAUD = 5_000_000, 28_800  # both a quarter of those of the counter box at 20 MHz
+BOX_HZ = 5_000_000
 BOX_START_S = 0.3  # until its serial core has read its firmware and listens
-STEP_S, LONGEST_S = 5e-3, 2.0  # of motion by hand
+BOX_ANSWER_S = 0.5  # its answers take four times as long as at 20 MHz
+STEP_S, REST_S, LONGEST_S = 2e-3, 0.05, 2.0  # of motion by hand
+HAND_UM, AROUND_UM = 40.0, 150.0  # how near a hand comes; where it passes the index from and to
 
 
 def parameters(design: Design) -> dict[str, int | str]:
@@ -36,16 +40,16 @@ def parameters(design: Design) -> dict[str, int | str]:
     return {name: value for name, value in design.parameters.items() if name not in BY_TWIN}
 
 
-def twin_of(design: Design, nodes: Sequence[Node], seed: int, clk_hz: int, baud: float) -> Twin:
+def twin_of(design: Design, nodes: Sequence[Node], seed: int, clk_hz: int) -> Twin:
     """Nodes that are the netlist of a design, with its firmware."""
-    machine, part = design.machine, design.board.part
+    part, folder = design.board.part, boards_build.write(design)
+    boards_build.make_firmware(design, folder)
     return Twin(
         nodes,
         seed=seed,
         clk_hz=clk_hz,
-        baud=baud,
         node_parameters=parameters(design),
-        firmware=build.firmware(machine.image, len(machine.axes), machine.core, machine.update),
+        firmware=build.words_of(folder / f"{firmware_stem(design.machine)}.hex"),
         netlist=f"{part.family.name} {part.synthesis}".strip(),
     )
 
@@ -58,7 +62,7 @@ class GateMotor(Motor):
         super().__init__(seed)
 
     def twin_of(self, nodes: Sequence[Node], seed: int) -> Twin:
-        return twin_of(self.design, nodes, seed, CLK_HZ, BAUD)
+        return twin_of(self.design, nodes, seed, CLK_HZ)
 
 
 def homes_and_moves(design: Design, seed: int) -> str:
@@ -82,24 +86,24 @@ class Box:
 
     def __init__(self, design: Design, seed: int) -> None:
         nodes = [Node(1, [Axis("linear_motor")] * len(design.machine.axes))]
-        self.twin = twin_of(design, nodes, seed, BOX_HZ, BOX_BAUD)
+        self.twin = twin_of(design, nodes, seed, BOX_HZ)
         self.twin.run(BOX_START_S)
-        self.axis = Bus(TwinTransport(self.twin), random_source=random.Random(seed)).axis(1)
+        port, source = TwinTransport(self.twin), random.Random(seed)
+        self.axis = Bus(port, answer_s=BOX_ANSWER_S, random_source=source).axis(1)
         for name in ("deglitch", "period", "counts_per_period"):
             self.axis.set_parameter(name, SETTINGS[name])
 
-    def push_to(self, target_um: float, read_um: Callable[[], float]) -> None:
-        """Pushes the mover, by what is read of its position, until it is within a count of the
-        target.
-        """
-        began = self.twin.time()
-        while abs(distance := target_um - read_um()) > COUNT_M * 1e6:
+    def push_to(self, target_um: float) -> None:
+        """Pushes the mover near the target; it is at rest then."""
+        machine, began = self.twin.machines[0], self.twin.time()
+        while abs(distance := target_um - self.true_um) > HAND_UM:
             if self.twin.time() - began > LONGEST_S:
-                raise MoireError(f"the box shows {distance:.1f} um beside the target")
-            velocity = self.twin.machines[0].state.velocity_m_s
-            self.twin.push(0, 4e-3 * distance + (1.1 if distance > 0 else -1.1) - 140 * velocity)
+                raise MoireError(f"the mover stays {distance:.0f} um beside {target_um} um")
+            force = 4e-3 * distance + (1.1 if distance > 0 else -1.1)
+            machine.push(force - 140 * machine.state.velocity_m_s)
             self.twin.run(STEP_S)
-        self.twin.push(0, 0.0)
+        machine.push(0.0)
+        self.twin.run(REST_S)
 
     @property
     def true_um(self) -> float:
@@ -107,25 +111,24 @@ class Box:
 
 
 def counts_and_captures(design: Design, seed: int) -> str:
-    """Why a mover that is pushed by what the netlist of the counter box shows does not come to the
-    target, measured from the index that the box has captured; empty if it does.
+    """Why the netlist of the counter box does not show where a mover is that is pushed by hand,
+    measured from the index that the box has captured; empty if it does.
     """
     box = Box(design, seed)
-    box.push_to(-100, lambda: box.true_um)
+    box.push_to(-AROUND_UM)
     box.axis.capture_from("index")
-    box.push_to(100, lambda: box.true_um)
+    box.push_to(AROUND_UM)
     captures, _ = box.axis.captures()
     if not captures or captures[0].sources != ("index",):
         return "the index was not captured"
-    zero_nm = captures[0].position_nm
-    shown_um = lambda: (box.axis.status().position_nm - zero_nm) / 1e3
-    box.push_to(TARGET_MM * 1e3, shown_um)
-    error_um = box.true_um - TARGET_MM * 1e3
-    events = box.axis.status().encoder_events
-    console.print(f"{design.name}: index at {zero_nm} nm, target missed by {error_um:.2f} um")
-    if events:
-        return ", ".join(events)
-    return f"{error_um:.2f} um beside the target" if abs(error_um) > NEAR_UM else ""
+    box.push_to(TARGET_MM * 1e3)
+    status = box.axis.status()
+    shown_um = (status.position_nm - captures[0].position_nm) / 1e3
+    console.print(f"{design.name}: {shown_um:.0f} um shown, {box.true_um:.2f} um true")
+    if status.encoder_events:
+        return ", ".join(status.encoder_events)
+    wrong_um = shown_um - box.true_um
+    return f"{wrong_um:.2f} um wrong" if abs(wrong_um) > NEAR_UM else ""
 
 
 MACHINES: Mapping[str, tuple[str, str, Callable[[Design, int], str]]] = {
@@ -136,15 +139,14 @@ MACHINES: Mapping[str, tuple[str, str, Callable[[Design, int], str]]] = {
 
 
 def elaborates(design: Design, _seed: int) -> str:
-    """Why Yosys does not read the node of a design; empty if it does."""
-    counted = ("AXES",)
-    values = parameters(design) | {name: design.parameters[name] for name in counted}
-    elaborated(source_of("node"), values)
+    """Why Yosys does not read the top of a design; empty if it does."""
+    top = boards_build.write(design) / "top.sv"
+    yosys(top, {}, "proc", f"gates-{design.name}", design.board.part.family.read_cells)
     return ""
 
 
 def gates_home_move(simulates: bool = True, seed: int = 1) -> float:
-    """Families of which the machine fails; without a simulation, of which the node is not read."""
+    """Families of which the machine fails; without a simulation, of which the top is not read."""
     failed = 0
     for family, (board, machine, check) in MACHINES.items():
         design = fit(boards.named(board), machines.named(machine))
@@ -166,9 +168,9 @@ FIGURES = {
         "makes of its node, with the parameters, synthesis options and firmware of its board and a "
         "slower clock: S3 on Colorlight i5 and on Tang Nano 20K homes to its index and moves; the "
         "counter box on iCEBreaker, which has no drives, captures the index of an axis that is "
-        "pushed, and shows when it is at the target",
+        "pushed, and shows where it is",
         "0",
-        Quick({"simulates": False}, "Yosys elaborates the nodes; nothing is simulated"),
+        Quick({"simulates": False}, "Yosys elaborates the tops; nothing is simulated"),
         0,
     ),
 }

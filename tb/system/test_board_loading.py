@@ -373,6 +373,19 @@ def test_a_placement_that_did_not_end_is_made_again(calls, monkeypatch):
         build.new_firmware(one, quiet)
 
 
+def test_a_placement_for_a_figure_is_not_taken_for_that_of_make_board(monkeypatch):
+    """It replaces what `make board` has placed, with whatever seed and clock."""
+    one = design("colorlight_i5")
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
+        folder = Path(name)
+        (folder / build.PLACED).write_text("placed")
+        build.Note("state", "1", "program").write(folder)
+        assert build.Note.read(folder) == build.Note("state", "1", "program")
+        monkeypatch.setattr(build, "placed", lambda *_: (1.0, {}))
+        build.place(one, folder, folder / "netlist.json", 3)
+        assert build.Note.read(folder) == build.Note()
+
+
 @pytest.mark.parametrize(
     "names, words",
     [

@@ -282,6 +282,31 @@ def test_inputs_without_a_pin_have_the_level_at_which_nothing_happens(tmp_path):
     assert given["rs485_rx"] == "usb_rx & rs485_rx"
 
 
+S0 = "constraints/machines/s0.toml"
+
+
+def test_a_recorder_of_ticks_is_built_where_its_memory_has_room(tmp_path):
+    path = edited(tmp_path, S0, ("filters = 2\n", "filters = 2\nscope_words = 16384\n"))
+    found = fit(board.named("ulx3s_85f"), machine.load(path))
+    assert found.parameters["SCOPE_WORDS"] == 16384
+    small = refusal(lambda: fit(board.named("ulx3s_25f"), machine.load(path)))
+    assert "need about 93 block RAM" in small, "57, and 36 for the recorder"
+    assert fit(board.named("ulx3s_85f"), machine.named("s0")).parameters["SCOPE_WORDS"] == 0
+
+
+@pytest.mark.parametrize(
+    "file, words, message",
+    [
+        (S0, 1000, "scope_words = 1000 must be 0 or a power of two from 256 to 65536"),
+        (S0, 128, "scope_words = 128 must be 0 or a power of two"),
+        (MILL, 256, "scope_words needs image axis or stream"),
+    ],
+)
+def test_a_recorder_of_ticks_that_cannot_be_is_refused(file, words, message, tmp_path):
+    path = edited(tmp_path, file, ("memory_kib", f"scope_words = {words}\nmemory_kib"))
+    assert message in refusal(lambda: machine.load(path))
+
+
 def test_a_board_without_switches_has_the_address_of_the_machine():
     assert (
         generate.inputs(fit(board.named("colorlight_i5"), machine.named("mill")))["address"]
@@ -731,6 +756,22 @@ def test_a_relay_on_a_board_without_flash_is_refused(tmp_path):
     arty = "constraints/arty_a7_35t/board.toml"
     found = refusal(lambda: fit(board.named("arty_a7_35t"), machine.load(path)))
     assert found == f"{path}: a relay needs flash_cs_n, {arty} has none"
+
+
+def test_a_serial_core_on_a_part_whose_bitstream_is_a_text_is_refused(tmp_path):
+    connectors = board.named("tang_nano_20k").connectors
+    places = (f"{name} {pin}" for name in ("J5", "J6") for pin in connectors[name])
+    path = edited(
+        tmp_path,
+        "constraints/machines/counter_box.toml",
+        ("[wiring.icebreaker]", "[wiring.tang_nano_20k]"),
+    )
+    path.write_text(re.sub(r'"PMOD\w+ \d+"', lambda _: f'"{next(places)}"', path.read_text()))
+    tang = "constraints/tang_nano_20k/board.toml"
+    assert refusal(lambda: fit(board.named("tang_nano_20k"), machine.load(path))) == (
+        f"{path}: a serial core has its firmware behind the bitstream, which is a text for "
+        f"GW2AR-18C of {tang}"
+    )
 
 
 def test_a_relay_on_a_smaller_part_is_refused(tmp_path):

@@ -187,3 +187,44 @@ def test_a_sync_pulse_is_counted_and_needs_a_good_frame(node):
     node.send_frame()
     assert node.read("bus.syncs") == 1
     assert node.read("bus.frames_good") == 2
+
+
+def test_a_reset_empties_the_port_and_ends_what_is_under_way(node):
+    bus(node)
+    node.write("bus.crc_start", start=1)
+    node.write("bus.crc_byte", 0x31)
+    node.send_words([command_byte(5, FROM_NODE) | NINTH])
+    node.send_words([command_byte(5, TO_NODE) | NINTH, 3, 1])  # the beginning of a frame
+    for _ in range(3):
+        node.write("bus.transmit", data=0, command=0)
+    assert node.get("rs485_driver_enable") == 1
+    node.set(rst=1)
+    node.run(8)
+    assert node.levels("rs485_tx", "rs485_driver_enable") == (1, 0)
+    node.set(rst=0)
+    node.watch("rs485_tx", "rs485_driver_enable")
+    node.run(100 * BIT)
+    assert not node.changes()
+    assert received(bus(node)) == []
+    assert node.fields("bus.state") == {"transmit_free": FREE, "sending": 0}
+    assert node.read("bus.crc") == 0
+    node.send_frame()
+    assert node.read("bus.frames_good") == 1 and node.read("bus.frames_bad") == 0
+
+
+def test_a_reset_in_the_middle_of_a_character_drops_it(node):
+    bit = 35  # cycles, the setting after a reset
+    command = command_byte(5, FROM_NODE)
+    levels = [0, *(command >> n & 1 for n in range(8)), 1, 1]
+    for n, level in enumerate(levels):
+        node.set(rs485_rx=level)
+        if n == 5:
+            node.set(rst=1)
+            node.run(8)
+            node.set(rst=0)
+        node.run(bit - 8 * (n == 5))
+    node.run(20 * bit)
+    assert received(node) == []
+    node.character("rs485_rx", command, 1, bit=bit)
+    node.run(20 * bit)
+    assert received(node) == [(command, 1, 0)]

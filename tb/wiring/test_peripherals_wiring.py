@@ -243,6 +243,30 @@ def test_a_serial_line_counts_as_idle_during_a_reset(peripherals):
     assert peripherals.read("sensor_state") == dict(sequence_number=5, stale=0)
 
 
+def test_a_reset_ends_all_that_is_under_way(peripherals):
+    names = [name for name in REGISTERS if name.endswith(("_state", "_errors", "_typed"))]
+    before = {name: peripherals.read(name) for name in [*names, "ps2_glitches", "edm_status"]}
+    peripherals.write("ps2_idle", value=1)
+    inject(peripherals)
+    peripherals.until(lambda: peripherals.get("edm_clock_low"))
+    peripherals.write("i2c", command=START)
+    peripherals.write("i2c", command=WRITE, data=0x55)
+    peripherals.clk(400)
+    for value in range(3):
+        peripherals.write("peer_transmit", value=value)
+        peripherals.write("display", value=value)
+    peripherals.clk(40)
+    assert peripherals.get("i2c_scl_low") and not peripherals.get("display_cs_n")
+    assert not peripherals.get("peer_tx")
+    peripherals.reset()
+    test_the_pins_are_idle_after_the_reset(peripherals)
+    lines = ("keyboard_clock_low", "keyboard_data_low", "edm_clock_low", "edm_data_low")
+    peripherals.watch("peer_tx", "display_cs_n", "i2c_scl_low", "i2c_sda_low", *lines)
+    peripherals.clk(20 * MS)
+    assert not peripherals.changes()
+    assert {name: peripherals.read(name) for name in before} == before
+
+
 def test_a_byte_of_a_frame_without_a_stop_bit_breaks_it(peripherals):
     peripherals.write("sensor_gap", value=50 * BIT)
     good = frame(5, 77)

@@ -21,7 +21,7 @@ the motion.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -335,8 +335,12 @@ def measure(
         low = low_band(response, high, low_hz, wished / float(axis.period_nm) * COUNTS)
         if low is None:
             return response
-        with softened(axis, tuning, softness(response, low_hz)):
-            return joined(recorded(axis, low, wished, records, one_more), response, tuning)
+        factor = softness(response, low_hz)
+        return joined(
+            recorded(axis, low, wished, records, one_more, lambda: softened(axis, tuning, factor)),
+            response,
+            tuning,
+        )
 
     override = axis.override()
     try:
@@ -379,8 +383,13 @@ def recorded(
     speed_nm_s: float,
     records: int,
     progress: Callable[[], object],
+    meanwhile: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> Response:
-    """The response by some records, each with a motion of its own."""
+    """The response by some records, each with a motion of its own.
+
+    `meanwhile` is in force while the axis moves evenly and is excited. Gains that change then leave
+    the command as it is, so that friction makes no error.
+    """
     scope, length = TickScope(axis), len(excitation.values)
     period_s, every = length * excitation.tick_s, excitation.sparse
     scope.load(excitation.values)
@@ -390,7 +399,7 @@ def recorded(
             way_nm = speed_nm_s * (SETTLING_PERIODS + PERIODS + 2) * period_s
             axis.begin_move(nm=way_nm if number % 2 == 0 else -way_nm, by=True)
             axis.dwell(STARTING_S)
-        with scope.excited(length):
+        with meanwhile(), scope.excited(length):
             axis.dwell(SETTLING_PERIODS * period_s)
             scope.start(SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s))
             axis.dwell((PERIODS + 1) * period_s)
@@ -498,12 +507,12 @@ class MeasuredPlant(Plant):
 
 def modelled(values: Array, tick_s: float, has_mode: bool) -> Plant:
     """The plant of the parameters of a fit: the logarithms of its time constant in ticks, gain,
-    ticks of delay, and of frequency and damping of the mode.
+    ticks of delay, second time constant in ticks, and of frequency and damping of the mode.
     """
-    time, gain, late = (float(value) for value in numpy.exp(values[:3]))
+    time, gain, late, second = (float(value) for value in numpy.exp(values[:4]))
     a = math.exp(-1 / max(time, 0.05))
     whole = int(late)
-    mode = (float(math.exp(values[3])), float(math.exp(values[4]))) if has_mode else (None, None)
+    mode = (float(math.exp(values[4])), float(math.exp(values[5]))) if has_mode else (None, None)
     return Plant(
         a=a,
         b=gain * (1 - a),
@@ -512,6 +521,7 @@ def modelled(values: Array, tick_s: float, has_mode: bool) -> Plant:
         resonance_hz=mode[0],
         part=late - whole,
         damping=mode[1],
+        lag=math.exp(-1 / max(second, 0.05)),
     )
 
 
@@ -536,7 +546,7 @@ def fit(response: Response) -> MeasuredPlant:
 
     w = 2 * math.pi * hz * response.tick_s
     rigid = [
-        [time, float(numpy.median(numpy.abs(points) * w * numpy.hypot(1, w * time))), late]
+        [time, float(numpy.median(numpy.abs(points) * w * numpy.hypot(1, w * time))), late, 0.5]
         for time in (4.0, 40.0, 400.0)
         for late in (0.5, 1.5, 3.5)
     ]
@@ -544,8 +554,14 @@ def fit(response: Response) -> MeasuredPlant:
     beyond = numpy.abs(points / modelled(values, response.tick_s, False).response(hz))
     upper = hz > hz[0] * 10
     peak_hz = float(hz[upper][beyond[upper].argmax()]) if upper.any() else float(hz[-1])
+    time, gain, late, _ = numpy.exp(values)
     with_mode, left_with_mode = best(
-        [[*numpy.exp(values), peak_hz, damping] for damping in (0.01, 0.05, 0.2)], True
+        [
+            [time, gain, max(0.3, late - second), second, peak_hz, damping]
+            for second in (0.1, 1.0)
+            for damping in (0.01, 0.05, 0.2)
+        ],
+        True,
     )
     has_mode = bool(left_with_mode @ left_with_mode < MODE_GAIN * (left @ left))
     if has_mode:

@@ -8,9 +8,10 @@
     Path("tuning.png").write_bytes(tune.picture(plant, tuning))
 
 Commands have the full scale 2^15, and positions are in LSB of 2^-16 period. The plant is a velocity
-that follows the command with a gain, one time constant and a delay, and a mode of the mechanics
-between the motor and the scale, if it has one:
+that follows the command with a gain, one time constant and a delay:
 v[n+1] = a v[n] + b ((1 - part) u[n - delay] + part u[n - delay - 1]).
+A plant may also have a second time constant, that of the winding, and a mode of the mechanics
+between the motor and the scale.
 """
 
 import math
@@ -85,9 +86,8 @@ class Plant:
     unexplained: float = 0.0  # share of the rms of the velocity that the model does not explain
     resonance_hz: float | None = None
     part: float = 0.0  # ticks beyond `delay`, 0 to 1
-    damping: float | None = (
-        None  # of critical, of a mode at resonance_hz; None: no mode is modelled
-    )
+    damping: float | None = None  # of critical, of a mode at resonance_hz; None: there is none
+    lag: float = 0.0  # out[n] = lag out[n-1] + (1 - lag) in[n]: the second time constant
 
     @property
     def gain(self) -> float:
@@ -115,6 +115,7 @@ class Plant:
         c1, c2 = self.mode
         late = (1 - self.part + self.part * back) * back ** (self.delay + 1)
         shaped = (1 - c1 - c2) / (1 - c1 * back - c2 * back**2)
+        shaped = shaped * (1 - self.lag) / (1 - self.lag * back)
         response: Complex = self.b * late * shaped / (1 - self.a * back) / (1 - back)
         return response
 
@@ -129,7 +130,7 @@ class Tuning:
     kv: int
     ka: int
     filters: tuple[Filter, ...]
-    bandwidth_hz: float  # frequency at which the open loop has the gain 1
+    bandwidth_hz: float  # lowest frequency at which the open loop has the gain 1
     phase_margin_degree: float
     gain_margin: float
 
@@ -546,18 +547,19 @@ def open_loop(plant: Plant, tuning: Tuning, hz: ArrayLike) -> Complex:
 
 
 def margins(plant: Plant, tuning: Tuning) -> tuple[float, float, float]:
-    """The highest frequency in Hz at which the open loop has the gain 1, the phase margin there in
-    degrees, and the gain margin.
+    """The bandwidth in Hz, the lowest frequency at which the open loop falls to the gain 1; the
+    phase margin in degrees, the smallest of all frequencies at which it has the gain 1, since a
+    resonance may reach it once more; and the gain margin.
     """
     hz = numpy.geomspace(1e-4, 0.499, 6000) / plant.tick_s
     loop = open_loop(plant, tuning, hz)
     size, phase = abs(loop), numpy.degrees(numpy.unwrap(numpy.angle(loop)))
-    above = numpy.flatnonzero(size >= 1)
-    if above.size == 0:
+    crossings = numpy.flatnonzero(numpy.diff(size >= 1))
+    if crossings.size == 0:
         return 0.0, 180.0, math.inf
-    at = above[-1]
+    at = crossings[0]
     turned = at + numpy.flatnonzero(numpy.diff(numpy.floor((phase[at:] + 180) / 360)) != 0)
-    margin = (phase[at] + 180 + 180) % 360 - 180
+    margin = abs((phase[crossings] + 180 + 180) % 360 - 180).min()
     return float(hz[at]), float(margin), float(1 / size[turned].max()) if turned.size else math.inf
 
 
@@ -575,7 +577,7 @@ def step(
     ticks = ticks or max(60, round(6 / (tuning.bandwidth_hz or 0.01 / plant.tick_s) / plant.tick_s))
     kp, ki, kd = (tuning.real(name) for name in ("kp", "ki", "kd"))
     queue, states = [0.0] * plant.delay, [[0.0] * 4 for _ in tuning.filters]
-    position = velocity = total = before = measured = 0.0
+    position = velocity = total = before = lagging = measured = 0.0
     (c1, c2), shaped = plant.mode, [0.0, 0.0]
     out = []
     for _ in range(ticks):
@@ -593,7 +595,8 @@ def step(
         given = queue.pop(0)
         velocity = plant.a * velocity + plant.b * ((1 - plant.part) * given + plant.part * before)
         before = given
-        measured = (1 - c1 - c2) * velocity + c1 * shaped[0] + c2 * shaped[1]
+        lagging += (1 - plant.lag) * (velocity - lagging)
+        measured = (1 - c1 - c2) * lagging + c1 * shaped[0] + c2 * shaped[1]
         shaped = [measured, shaped[0]]
         position += measured
     return numpy.full(ticks, size), numpy.array(out)
