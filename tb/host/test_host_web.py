@@ -311,6 +311,17 @@ def test_a_second_stop_is_not_taken_for_the_first_one_repeated():
     bridge.gateway.close()
 
 
+@pytest.mark.parametrize("node", [0, 16, 999])
+@pytest.mark.parametrize("path", ["stop", "disable", "enable", "take", "move"])
+def test_a_node_that_cannot_be_is_refused_and_the_server_goes_on(shared, node, path):
+    with shared.http() as client:
+        status, values = client.ask(
+            "POST", f"/api/nodes/{node}/axes/0/{path}", {"to": "1 mm"} if path == "move" else None
+        )
+        assert status == 400 and f"there is no address {node}" in values["error"]["text"]
+        client.done("GET", f"{AXIS}?max_age=0s")
+
+
 def test_connections_with_one_name_are_one_client(served):
     headers = {"Moire_Client": "bench"}
     with Http(*served.place, **headers) as first, Http(*served.place, **headers) as second:

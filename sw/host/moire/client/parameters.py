@@ -119,7 +119,7 @@ class AxisParameters(AxisAccess):
         if (travel := pair(*TRAVEL)) and travel[1].counts < travel[0].counts:
             low, high = (value.written(9) for value in travel)
             raise OutOfRange(f"travel_high ({high}) would lie below travel_low ({low})")
-        if travel is not None:
+        if travel is not None and period_nm in (None, self.period_nm):
             self.check_inside(*(value.value for value in travel))
         for first, choice, second in EXCLUSIVE:
             found = pair(first, second)

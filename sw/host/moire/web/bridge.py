@@ -111,8 +111,9 @@ class Bridge:
 
     def send(self, client: Hashable, address: int, body: bytes) -> "Future[Sample | None]":
         """Queues a request, a body without its sequence number; the result is the reply, None if
-        the node does not answer.
+        the node does not answer. Raises OutOfRange for an address that no node can have.
         """
+        require_address(address)
         future: Future[Sample | None] = Future()
         with self.lock:
             if self.closed:
@@ -142,10 +143,7 @@ class Bridge:
 
     def require_present(self, address: int) -> None:
         """A node that did not answer a moment ago would keep all others waiting again."""
-        if address not in ADDRESSES:
-            raise OutOfRange(
-                f"there is no address {address}: allowed are {ADDRESSES[0]} to {ADDRESSES[-1]}"
-            )
+        require_address(address)
         if self.absent.get(address, 0.0) > time.monotonic():
             raise NoAnswer(address)
 
@@ -383,6 +381,14 @@ class BridgeTime(Transport):
 
     def wait(self, seconds: float) -> None:
         time.sleep(seconds)
+
+
+def require_address(address: int) -> None:
+    """Raises OutOfRange for an address that no node can have."""
+    if address not in ADDRESSES:
+        raise OutOfRange(
+            f"there is no address {address}: allowed are {ADDRESSES[0]} to {ADDRESSES[-1]}"
+        )
 
 
 def settle(work: Callable[[], None]) -> None:

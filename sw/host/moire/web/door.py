@@ -188,7 +188,7 @@ class Connection(H11Protocol):
         if self.peer is not None:
             self.crowd.bridge.leave(self.peer)
         super().handle_websocket_upgrade(event)
-        self.forget_host()  # the end of the connection is told to the WebSocket alone
+        self.forget_host()  # only the WebSocket will see the end of the connection
 
 
 class Socket(WSProtocol):
