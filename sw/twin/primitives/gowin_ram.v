@@ -2,7 +2,7 @@
 // gowin_ram -- behaviour of the block RAMs of Gowin parts, of which Yosys has black boxes only:
 // 2048 groups of UNIT bits (8, or 9 with parity) in rows of four. A port of w bits sees a part of a
 // row, whose number is address[13:5]. Ports of 2 UNIT and 4 UNIT bits have a write enable for each
-// group in their last address bits. Guide: Gowin UG285, "BSRAM & SSRAM User Guide". Registers behind
+// group in their last address bits. Guide: Gowin UG285, BSRAM & SSRAM User Guide. Registers behind
 // the outputs, which Yosys never makes, are refused. A port that reads what the other one writes at
 // the same edge reads the old bits.
 // During a write the output stays (MODE 0), or it is the new word (1) or the old one (2).
