@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// gowin_ram -- behaviour of the block RAMs of Gowin parts, of which Yosys has black boxes only: 2048
-// groups of UNIT bits (8, or 9 with parity) in rows of four. A port of w bits sees a part of a row,
-// whose number is address[13:5]. Ports of 2 UNIT and 4 UNIT bits have a write enable for each group in
-// their last address bits. Guide: Gowin UG285, "BSRAM & SSRAM User Guide". What Yosys never makes, as
-// registers behind the outputs, is refused. A port that reads what the other one writes at the same
-// edge reads the old bits.
+// gowin_ram -- behaviour of the block RAMs of Gowin parts, of which Yosys has black boxes only:
+// 2048 groups of UNIT bits (8, or 9 with parity) in rows of four. A port of w bits sees a part of a
+// row, whose number is address[13:5]. Ports of 2 UNIT and 4 UNIT bits have a write enable for each
+// group in their last address bits. Guide: Gowin UG285, BSRAM & SSRAM User Guide. Registers behind
+// the outputs, which Yosys never makes, are refused. A port that reads what the other one writes at
+// the same edge reads the old bits.
+// During a write the output stays (MODE 0), or it is the new word (1) or the old one (2).
 
 module gowin_ram #(
-    parameter integer                UNIT       = 8,
-    parameter integer                WIDTH_A    = 8,
-    parameter integer                WIDTH_B    = 8,
-    parameter integer                MODE_A     = 0,       // of a write: 0: the output stays, 1: it is the new word, 2: the old one
-    parameter integer                MODE_B     = 0,
-    parameter integer                PIPELINED  = 0,
-    parameter                        RESET_MODE = "SYNC",
-    parameter         [UNIT*2048-1:0] INIT      = 0
+    parameter integer UNIT = 8,
+    parameter integer WIDTH_A = 8,
+    parameter integer WIDTH_B = 8,
+    parameter integer MODE_A = 0,
+    parameter integer MODE_B = 0,
+    parameter integer PIPELINED = 0,
+    parameter RESET_MODE = "SYNC",
+    parameter [UNIT*2048-1:0] INIT = 0
 ) (
     input             clka,
     input             clkb,
@@ -43,7 +44,8 @@ module gowin_ram #(
     function [5:0] first_bit(input [13:0] address, input integer width);
         first_bit = (width <= 2 * UNIT && address[4] ? 2 * UNIT : 0)
             + (width <= UNIT && address[3] ? UNIT : 0)
-            + (width == 4 ? 4 * address[2] : width == 2 ? 2 * address[2:1] : width == 1 ? address[2:0] : 0);
+            + (width == 4 ? 4 * address[2] : width == 2 ? 2 * address[2:1] : 0)
+            + (width == 1 ? address[2:0] : 0);
     endfunction
 
     // the bits of a row that it writes
