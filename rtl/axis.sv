@@ -34,7 +34,8 @@ module axis #(
     parameter int HAS_BRIDGE = HAS_DRIVE,  // 1: build the bridge
     parameter int HAS_STEPPER = HAS_DRIVE,  // 1: build the step generator
     parameter int HAS_DAC = HAS_DRIVE,  // 1: build the DAC
-    parameter int HAS_FINE_STAGE = HAS_DAC  // 1: build the fine stage; needs the DAC
+    parameter int HAS_FINE_STAGE = HAS_DAC,  // 1: build the fine stage; needs the DAC
+    parameter int HAS_SET_POINTS = 0  // 1: set_point_player of the node serves the axis
 ) (
     input wire clk,
     input wire rst,
@@ -84,6 +85,9 @@ module axis #(
     input wire [2:0] result_kind,  // number of what it is
     input wire [47:0] result,  // value, signed
     input wire result_flag,  // level: its flag
+    // set_point_player: the words of its registers
+    input wire [31:0] stream_state,  // state of the stream
+    input wire [31:0] stream_counts,  // counts of set-points
     // step_lines
     input wire line_start,  // strobe: the lines of motor steps begin
     input wire line_idle,  // level: the lines have ended
@@ -145,6 +149,9 @@ module axis #(
     end
     if (HAS_DRIVE == 0 && FILTERS != 0) begin : g_check_filters
         FILTERS_NEED_HAS_DRIVE u_error ();
+    end
+    if (HAS_DRIVE == 0 && HAS_SET_POINTS != 0) begin : g_check_set_points
+        SET_POINTS_NEED_HAS_DRIVE u_error ();
     end
 
     // requests
@@ -453,6 +460,8 @@ module axis #(
         };
     end
 
+    wire unused_stream = &{1'b0, stream_state[15:14]};
+
     axis_registers #(
         .HAS_MONITOR(HAS_MONITOR),
         .HAS_DRIVE  (HAS_DRIVE)
@@ -502,6 +511,7 @@ module axis #(
         .built_fine_stage              (1'(HAS_FINE_STAGE)),
         .built_filters                 (3'(FILTERS)),
         .built_segments                (8'(SEGMENTS)),
+        .built_set_points              (1'(HAS_SET_POINTS)),
         // interlock
         .faults,
         .causes_now,
@@ -531,6 +541,15 @@ module axis #(
         .encoder_fault_mask,
         .rejected_pulses               (pulse_rejected),
         .rejected_samples              (sample_rejected),
+        // streamed set-points
+        .stream_state_mode             (stream_state[2:0]),
+        .stream_state_ended            (stream_state[5:3]),
+        .stream_state_refusal          (stream_state[8:6]),
+        .stream_state_room             (stream_state[13:9]),
+        .stream_state_extrapolated     (stream_state[31:16]),
+        .stream_counts_accepted        (stream_counts[15:0]),
+        .stream_counts_late            (stream_counts[23:16]),
+        .stream_counts_refused         (stream_counts[31:24]),
         // servo
         .following_error               (error),
         .command

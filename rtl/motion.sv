@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// motion -- move all axes of a node: pass their settings and requests to the motion engine, and
-// draw lines of motor steps from its targets.
+// motion -- move all axes of a node: pass their settings, their requests and their streamed
+// set-points to the motion engine, and draw lines of motor steps from its targets.
 //
-// latency  see engine_bus, motion_engine and step_lines
-// rate     see engine_bus, motion_engine and step_lines
-// behaviour  Without HAS_VELOCITY there is no engine, and without HAS_STEPPER there are no lines of
-//          motor steps: what they would report is 0.
+// latency  see engine_bus, motion_engine, set_point_player and step_lines
+// rate     see engine_bus, motion_engine, set_point_player and step_lines
+// behaviour  Without HAS_VELOCITY there is no engine, without HAS_SET_POINTS no player of
+//          set-points, and without HAS_STEPPER there are no lines of motor steps: what they would
+//          report is 0.
 // source   S0, S2, S3: one servo and one profile for each axis; here one datapath serves all axes
 // model    the models of its blocks; tested together by tb/system
 `default_nettype none
 
 module motion #(
-    parameter int AXES         = 1,  // axes of the node, 1 to 8
-    parameter int FILTERS      = 0,  // filters of each servo, 0 to 4
-    parameter int TICK_CYCLES  = 0,  // cycles between two ticks; 0: not checked
-    parameter int HAS_VELOCITY = 1,  // 1: build the engine
-    parameter int HAS_STEPPER  = 1   // 1: build the lines of motor steps; needs the engine
+    parameter int AXES           = 1,  // axes of the node, 1 to 8
+    parameter int FILTERS        = 0,  // filters of each servo, 0 to 4
+    parameter int TICK_CYCLES    = 0,  // cycles between two ticks; 0: not checked
+    parameter int HAS_VELOCITY   = 1,  // 1: build the engine
+    parameter int HAS_SET_POINTS = 0,  // axes that can follow set-points; a mask, needs the engine
+    parameter int HAS_STEPPER    = 1   // 1: build the lines of motor steps; needs the engine
 ) (
     input wire clk,
     input wire rst,
@@ -40,6 +42,7 @@ module motion #(
     input wire [AXES-1:0] block_up,  // levels: no positive command passes
     input wire [AXES-1:0] block_down,  // levels: no negative command passes
     input wire [AXES-1:0] closed_loop,  // levels: the servo commands the drive
+    input wire [AXES-1:0] enabled,  // levels: the drive is on
     // requests, bit n: axis n
     input wire [AXES-1:0] play,  // strobes: play the queued segments
     input wire [AXES-1:0] arm,  // strobes: play them at start_at
@@ -47,6 +50,10 @@ module motion #(
     input wire [AXES-1:0] hold_target,  // strobes: target := position
     output logic [AXES-1:0] request_waits,  // levels: a request is not done yet
     input wire [AXES-1:0] pending,  // levels: a request is not done and shown
+    // streamed set-points, for the registers
+    output logic [31:0] tick_count,  // servo ticks since reset
+    output logic [32*AXES-1:0] stream_states,  // state of the stream of each axis
+    output logic [32*AXES-1:0] stream_counts,  // counts of set-points of each axis
     // results, as in motion_engine
     output logic result_valid,  // strobe: result is new
     output logic [2:0] result_axis,  // number of its axis
@@ -76,6 +83,56 @@ module motion #(
         wire [AXES-1:0] gains_changed, push;
         wire signed [47:0] shift_by;
         wire               busy;
+        wire [AXES-1:0] streamed, stream_start, stream_stop;
+        wire piece_valid, piece_taken, settled;
+        wire        [ 2:0] piece_axis;
+        wire        [ 1:0] piece_part;
+        wire signed [63:0] piece_word;
+
+        if (HAS_SET_POINTS % (1 << AXES) != 0) begin : g_set_points
+            set_point_player #(
+                .AXES(AXES),
+                .MASK(HAS_SET_POINTS)
+            ) u_player (
+                .clk,
+                .rst,
+                .tick,
+                // register memory
+                .stores,
+                .stored_at,
+                .stored_value,
+                .wdata_low,
+                // the axes
+                .enabled,
+                .stops (controlled_stop | hold_target),
+                // results
+                .result_valid,
+                .result_axis,
+                .result_kind,
+                .result,
+                // pieces
+                .streamed,
+                .piece_valid,
+                .piece_axis,
+                .piece_part,
+                .piece_word,
+                .piece_taken,
+                .settled,
+                // requests
+                .start (stream_start),
+                .stop  (stream_stop),
+                // registers
+                .tick_count,
+                .states(stream_states),
+                .counts(stream_counts)
+            );
+        end else begin : g_no_set_points
+            assign {streamed, stream_start, stream_stop} = '0;
+            assign {piece_valid, piece_axis, piece_part, piece_word} = '0;
+            assign {tick_count, stream_states, stream_counts} = '0;
+
+            wire unused = &{1'b0, enabled, piece_taken, settled};
+        end
 
         engine_bus #(
             .AXES   (AXES),
@@ -90,6 +147,14 @@ module motion #(
             .value_low(wdata_low),
             .hold,
             .waits,
+            // pieces
+            .streamed,
+            .piece_valid,
+            .piece_axis,
+            .piece_part,
+            .piece_word,
+            .piece_taken,
+            .settled,
             // settings
             .ready,
             .setting_waits,
@@ -131,9 +196,9 @@ module motion #(
             .block_down,
             .closed_loop,
             // requests
-            .start                 (play),
+            .start                 (play | stream_start),
             .arm,
-            .controlled_stop,
+            .controlled_stop       (controlled_stop | stream_stop),
             .set_target_to_position(hold_target),
             .push,
             .gains_changed,
@@ -158,6 +223,7 @@ module motion #(
         assign {hold, waits, request_waits} = '0;
         assign {result_valid, result_axis, result_kind, result, result_flag} = '0;
         assign {servo_overrun, cycles} = '0;
+        assign {tick_count, stream_states, stream_counts} = '0;
 
         wire unused_time = &{1'b0, clk, rst, tick, now};
         wire unused_registers = &{1'b0, stores, stored_at, stored_value, wdata_low};
@@ -165,7 +231,7 @@ module motion #(
             1'b0, position, step_made, step_down, moves, moved, moved_by, block_up, block_down,
             closed_loop
         };
-        wire unused_requests = &{1'b0, play, arm, controlled_stop, hold_target, pending};
+        wire unused_requests = &{1'b0, play, arm, controlled_stop, hold_target, pending, enabled};
     end
     if (HAS_STEPPER != 0) begin : g_lines
         step_lines #(

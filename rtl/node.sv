@@ -40,12 +40,14 @@ module node #(
     parameter int HAS_STEPPER = HAS_DRIVE,  // axes with a step generator, needs the drive
     parameter int HAS_DAC = HAS_DRIVE,  // axes with a DAC, needs the drive
     parameter int HAS_FINE_STAGE = HAS_DAC,  // axes with a fine stage, needs the DAC
+    parameter int HAS_SET_POINTS = 0,  // axes that can follow streamed set-points, needs the drive
     parameter int HAS_I2C = 0,  // 1: build the I2C master
     parameter int HAS_PS2 = 0,  // 1: build the PS/2 pass-through
     parameter int HAS_PEER = 0,  // 1: build the peer port
     parameter int HAS_ANGLE_SENSOR = 0,  // 1: build the receiver of the angle sensor
     parameter int HAS_DISPLAY = 0,  // 1: build the numeric display
     parameter int HAS_STATUS_INPUTS = 0,  // 1: build the status inputs
+    parameter int SCOPE_WORDS = 0,  // words of the recorder of ticks; 0: none, and no excitation
     parameter int HAS_LINK = 0,  // 1: build the real-time link
     parameter int HAS_SERIAL_CORE = 0,  // 1: bit-serial soft core, with its firmware in a flash
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
@@ -159,8 +161,20 @@ module node #(
     wire [AXES-1:0] play, arm, controlled_stop, hold_target, request_waits, pending;
     wire result_valid, result_flag, servo_overrun;
     wire [2:0] result_axis, result_kind;
-    wire [47:0] result;
+    wire [47:0] result, computed;  // with and without the excitation
     wire [15:0] cycles;
+    wire [31:0] tick_count;
+    wire [32*AXES-1:0] stream_states, stream_counts;
+    // recorder of ticks, excitation
+    wire [2:0] scope_axis, excitation_axis;
+    wire [5:0] scope_signals;
+    wire [15:0] scope_length, scope_every;
+    wire scope_start, scope_read, scope_recording, scope_full, excitation_written;
+    wire        [31:0] scope_word;
+    wire        [12:0] excitation_period;
+    wire        [14:0] excitation_limit;
+    wire signed [15:0] excitation_value;
+    wire        [11:0] excitation_at;
     // lines of motor steps
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;
@@ -259,6 +273,7 @@ module node #(
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_MONITOR      (HAS_MONITOR),
         .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_SET_POINTS   (HAS_SET_POINTS),
         .HAS_SINE         (HAS_SINE),
         .HAS_STEPPER      (HAS_STEPPER),
         .HAS_VELOCITY     (HAS_VELOCITY),
@@ -308,18 +323,19 @@ module node #(
         .clk,
         .rst,
         // register bus
-        .select       (node_select),
+        .select                  (node_select),
         .write,
         .word,
         .wdata,
-        .rdata        (node_rdata),
+        .rdata                   (node_rdata),
         // what is built
-        .clk_hz       (32'(CLK_HZ)),
-        .build_axes   (4'(AXES)),
-        .build_address(address),
-        .build_memory (8'(MEMORY_BYTES / 1024)),
+        .clk_hz                  (32'(CLK_HZ)),
+        .build_axes              (4'(AXES)),
+        .build_address           (address),
+        .build_memory            (8'(MEMORY_BYTES / 1024)),
+        .build_scope             (9'(SCOPE_WORDS / 256)),
         // time
-        .time_stamp   (now),
+        .time_stamp              (now),
         .tick_period,
         .sample_period,
         // firmware
@@ -327,7 +343,26 @@ module node #(
         .start_axes,
         .start_axes_written,
         .wait_time,
-        .wait_time_written
+        .wait_time_written,
+        // streamed set-points
+        .tick_count,
+        // recorder of ticks
+        .scope_axis,
+        .scope_signals,
+        .scope_samples_length    (scope_length),
+        .scope_samples_every     (scope_every),
+        .scope_state_start       (scope_start),
+        .scope_state_recording   (scope_recording),
+        .scope_state_full        (scope_full),
+        .scope_word,
+        .scope_word_read         (scope_read),
+        // excitation
+        .excitation_axis,
+        .excitation_period,
+        .excitation_limit,
+        .excitation_value,
+        .excitation_value_at     (excitation_at),
+        .excitation_value_written(excitation_written)
     );
 
     // the soft core waits while it has nothing to do
@@ -386,11 +421,12 @@ module node #(
     );
 
     motion #(
-        .AXES        (AXES),
-        .FILTERS     (SERVO_FILTERS),
-        .TICK_CYCLES (CLK_HZ / TICK_HZ),
-        .HAS_VELOCITY(32'(HAS_VELOCITY % (1 << AXES) != 0)),
-        .HAS_STEPPER (32'(HAS_STEPPER % (1 << AXES) != 0))
+        .AXES          (AXES),
+        .FILTERS       (SERVO_FILTERS),
+        .TICK_CYCLES   (CLK_HZ / TICK_HZ),
+        .HAS_VELOCITY  (32'(HAS_VELOCITY % (1 << AXES) != 0)),
+        .HAS_SET_POINTS(HAS_SET_POINTS),
+        .HAS_STEPPER   (32'(HAS_STEPPER % (1 << AXES) != 0))
     ) u_motion (
         .clk,
         .rst,
@@ -415,6 +451,7 @@ module node #(
         .block_up,
         .block_down,
         .closed_loop,
+        .enabled    (drive_enable),
         // requests
         .play,
         .arm,
@@ -422,11 +459,15 @@ module node #(
         .hold_target,
         .request_waits,
         .pending,
+        // streamed set-points
+        .tick_count,
+        .stream_states,
+        .stream_counts,
         // results
         .result_valid,
         .result_axis,
         .result_kind,
-        .result,
+        .result     (computed),
         .result_flag,
         // schedule
         .servo_overrun,
@@ -440,6 +481,68 @@ module node #(
         .rate_steep,
         .line_stopped
     );
+
+    if (SCOPE_WORDS != 0) begin : g_scope
+        wire         first;
+        wire [W-1:0] sine = sample_sin[W*scope_axis+:W];
+        wire [W-1:0] cosine = sample_cos[W*scope_axis+:W];
+
+        command_excitation u_excitation (
+            .clk,
+            .rst,
+            // settings
+            .axis       (excitation_axis),
+            .period     (excitation_period),
+            .limit      (excitation_limit),
+            .store      (excitation_written),
+            .store_at   (excitation_at),
+            .store_value(excitation_value),
+            // motion engine
+            .valid      (result_valid),
+            .result_axis,
+            .kind       (result_kind),
+            .result     (computed),
+            // to the axes
+            .excited    (result),
+            .first
+        );
+        tick_recorder #(
+            .WORDS(SCOPE_WORDS)
+        ) u_recorder (
+            .clk,
+            .rst,
+            // settings
+            .start      (scope_start),
+            .axis       (scope_axis),
+            .signals    (scope_signals),
+            .length     (scope_length),
+            .every      (scope_every),
+            // what is recorded
+            .tick,
+            .ready      (first),
+            .sine_cosine({16'($signed(cosine)), 16'($signed(sine))}),
+            .valid      (result_valid),
+            .result_axis,
+            .kind       (result_kind),
+            .result     (result[31:0]),
+            // reading
+            .read       (scope_read),
+            .word       (scope_word),
+            .recording  (scope_recording),
+            .full       (scope_full)
+        );
+    end else begin : g_no_scope
+        assign result = computed;
+        assign {scope_word, scope_recording, scope_full} = '0;
+
+        wire unused_scope = &{
+            1'b0, scope_axis, scope_signals, scope_length, scope_every, scope_start, scope_read
+        };
+        wire unused_excitation = &{
+            1'b0, excitation_axis, excitation_period, excitation_limit, excitation_value,
+            excitation_at, excitation_written
+        };
+    end
 
     // interlock
     core_watchdog #(
@@ -634,7 +737,8 @@ module node #(
             .HAS_BRIDGE       (HAS_BRIDGE >> n & 1),
             .HAS_STEPPER      (HAS_STEPPER >> n & 1),
             .HAS_DAC          (HAS_DAC >> n & 1),
-            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1)
+            .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1),
+            .HAS_SET_POINTS   (HAS_SET_POINTS >> n & 1)
         ) u_axis (
             .clk,
             .rst,
@@ -684,6 +788,9 @@ module node #(
             .result_kind,
             .result,
             .result_flag,
+            // set_point_player
+            .stream_state         (stream_states[32*n+:32]),
+            .stream_counts        (stream_counts[32*n+:32]),
             // step_lines
             .line_start,
             .line_idle,

@@ -42,6 +42,7 @@ LISTS = (  # lists of codes or bits with their words
     "calibration_action",
     "scope_trigger",
     "scope_state",
+    "tick_signal",
     "turn_phase",
     "peer_phase",
     "job_state",

@@ -18,6 +18,7 @@ BLOCKS = ("axis", "feedback", "actuator")  # by their kind
 BASE, BLOCKS_OF_KIND = 0x400, 8  # byte address of the first block, blocks of each kind
 GAINS = ("kp", "kd", "kv", "ka")  # after whose change the integral takes what keeps the command
 PUSH = "segment_ticks"  # a write of it queues the segment
+SEGMENT = "segment_"  # how the words of a segment begin
 FILTER_ADDRESS, FILTER_VALUE = "filter_address", "filter_value"  # of all values of the filters
 
 
@@ -90,6 +91,7 @@ def text() -> str:
         "has_sign": [w for w in found if w.signed and not w.wide],
         "gain": [w for w in found if w.name in GAINS],
         "push": [w for w in found if w.name == PUSH],
+        "segment": [w for w in found if w.name.startswith(SEGMENT)],
         "filter_address": [w for w in found if w.name == FILTER_ADDRESS],
         "filter_value": [w for w in found if w.name == FILTER_VALUE],
     }
@@ -114,6 +116,7 @@ module engine_words (
     output logic has_sign,  // level: its value has 32 bits or less and is signed
     output logic gain,  // level: it is a gain of the servo
     output logic push,  // level: a write of it queues the segment
+    output logic segment,  // level: it is a word of the segment
     output logic filter_address,  // level: it is the number of a value of a filter
     output logic filter_value  // level: it is the value of a filter
 );

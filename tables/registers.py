@@ -127,6 +127,7 @@ class Register:
     vector: bool
     text: str
     engine: str  # word of motion_engine that holds it, or none
+    snooped: bool  # taken from what the register memory stores
     fields: tuple[Field, ...]
 
     @property
@@ -197,8 +198,8 @@ class Block:
 
     @property
     def own(self) -> list[Register]:
-        """The registers of which the block itself has something: all but those of the engine."""
-        return [r for r in self.registers if not r.engine]
+        """The registers of which the block itself has something."""
+        return [r for r in self.registers if not r.engine and not r.snooped]
 
     @property
     def own_fields(self) -> list[tuple[Register, Field]]:
@@ -466,15 +467,18 @@ def register_of(node: Node) -> Register:
         raise Refused(f"{node.get_path()}: 32 bits, or 64 with accesswidth 32")
     fields = tuple(field_of(f, node) for f in node.children() if isinstance(f, FieldNode))
     whole = [f.low for f in fields] == list(range(len(fields)))
-    engine = str(node.get_property("engine") or "")
-    if engine and any(f.kind != "setting" or f.on_write for f in fields):
-        raise Refused(f"{node.get_path()}: a word of the engine holds settings only")
+    engine, snooped = str(node.get_property("engine") or ""), bool(node.get_property("snooped"))
+    if (engine or snooped) and any(f.kind != "setting" or f.on_write for f in fields):
+        raise Refused(f"{node.get_path()}: a register without ports holds settings only")
+    if snooped and any("r" not in f.access for f in fields):
+        raise Refused(f"{node.get_path()}: the register memory stores only what can be read")
     if width == 64 and any(f.kind == "setting" and f.reset for f in fields):
         raise Refused(f"{node.get_path()}: a setting of 64 bits begins at 0")
     if vector and not (whole and len({f.kind for f in fields}) == 1):
         raise Refused(f"{node.get_path()}: a vector has one kind of bits, from bit 0 on")
     offset = node.raw_address_offset
-    return Register(node.inst_name, offset, width == 64, vector, described(node), engine, fields)
+    text = described(node)
+    return Register(node.inst_name, offset, width == 64, vector, text, engine, snooped, fields)
 
 
 def read(axes: int = 1, source: Path = SOURCE) -> list[Block]:

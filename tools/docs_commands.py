@@ -38,12 +38,15 @@ PROGRAMS = ROOT / "build" / "venv" / "bin"
 COMMAND = re.compile(r"(moire|make|export|pip|build/venv/bin/\w+)\b")
 HARDWARE = re.compile(r"/dev/ttyUSB0|COM3|socket://127\.0\.0\.1:2218")
 RESOLVED_ONLY = re.compile(
-    r"make (test$|check|figures|soak|board|litex|gowin|chromium|ngspice|spice|load|flash)"
+    r"make (test$|check|figures|soak|board|litex|gowin|chromium|ngspice|linuxcnc|spice|load|flash"
+    r"|firmware BOARD)"
 )
 ENDLESS = re.compile(r"moire\b.* (watch|serve)\b|moire (watch|serve)\b")
 SERVER = re.compile(r"moire\b.* serve$")  # any free ports: the served twin may have the usual ones
 EXPERIMENT = re.compile(r"build/venv/bin/python -m experiments\.")
-RESOLVED_IN_SHORT = re.compile(r"make (demo|format|test K)")  # unless the whole is asked for
+RESOLVED_IN_SHORT = re.compile(
+    r"make (demo|format|test K|prove K|tables|lint|promises|docs)"
+)  # unless the whole is asked for
 LONGEST_S = 4  # of an experiment, unless the whole is asked for
 ENDLESS_S = 4  # of a command that only Ctrl-C ends
 PATIENCE_S = 600  # of every other command
@@ -92,7 +95,10 @@ def read(path: Path) -> Page:
 
 def pages() -> list[Page]:
     """The pages that print commands."""
-    paths = [ROOT / "README.md", ROOT / "sw" / "host" / "README.md", *(ROOT / "docs").glob("*.md")]
+    paths = [
+        *(ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "sw" / "host" / "README.md"),
+        *(ROOT / "docs").glob("*.md"),
+    ]
     return [page for page in map(read, sorted(paths)) if page.commands]
 
 

@@ -17,6 +17,7 @@ module engine_words (
     output logic has_sign,  // level: its value has 32 bits or less and is signed
     output logic gain,  // level: it is a gain of the servo
     output logic push,  // level: a write of it queues the segment
+    output logic segment,  // level: it is a word of the segment
     output logic filter_address,  // level: it is the number of a value of a filter
     output logic filter_value  // level: it is the value of a filter
 );
@@ -31,7 +32,7 @@ module engine_words (
             8'h2B: places = 5'd15;
             default: places = 5'd16;
         endcase
-        {of_engine, wide, has_sign, gain, push, filter_address, filter_value} = '0;
+        {of_engine, wide, has_sign, gain, push, segment, filter_address, filter_value} = '0;
         case (entry)
             8'h08, 8'h1C, 8'h20, 8'h21, 8'h22, 8'h23, 8'h24, 8'h25, 8'h26, 8'h29, 8'h2B, 8'h2D,
                 8'h2F, 8'h30, 8'h31, 8'h32, 8'h33, 8'h34, 8'h35, 8'h36, 8'h37, 8'h67, 8'h85, 8'h87:
@@ -52,6 +53,10 @@ module engine_words (
         endcase
         case (entry)
             8'h31: push = 1'b1;
+            default: ;
+        endcase
+        case (entry)
+            8'h2D, 8'h2F, 8'h30, 8'h31: segment = 1'b1;
             default: ;
         endcase
         case (entry)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // set_point_piece -- turn a set-point into a piece of constant jerk for the queue of motion_engine.
 //
-// latency   323 + 2 * ticks cycles from begin_piece to valid, if the set-point is accepted; at most
-//           as many if it is refused
+// latency   323 + 2 * ticks cycles from begin_piece to valid, if the set-point is accepted, 3 for a
+//           piece of one tick; at most as many if it is refused
 // rate      one set-point, then the next one from the cycle of valid on
 // accuracy  Acceleration and jerk are rounded down to 2^-40 period. So the piece ends less than
 //           ticks * ticks * ticks units of 2^-40 period from its set-point. end_position and
@@ -17,8 +17,10 @@
 //           half a tick of velocity before its set-point. A set-point is refused if it is 2^14
 //           periods or more away, or if velocity or acceleration of any tick is above its limit.
 //           Positions are rounded to 2^-16 period by the caller, which may add up to
-//           6 / ticks^2 of that to the acceleration at an end of a piece.
-// limits    ticks is 2 to 255. The inputs stay as they are until valid. begin_velocity and velocity
+//           6 / ticks^2 of that to the acceleration at an end of a piece. A piece of one tick has
+//           constant velocity, end_velocity, with which it begins: the step of the velocity is
+//           compared with the limit of the acceleration.
+// limits    ticks is 1 to 255. The inputs stay as they are until valid. begin_velocity and velocity
 //           are in the range of 2^47 units.
 // source    forward differences of a cubic, as in docs/stream.md
 // model     tb/control/set_point_piece.py: busy and valid are equal in every cycle, refused and the
@@ -53,6 +55,7 @@ module set_point_piece (
     enum logic [2:0] {
         REST,
         COAST,
+        SINGLE,
         PREPARE,
         DIVIDE,
         PLAY
@@ -96,6 +99,12 @@ module set_point_piece (
     wire               beyond = next_velocity > fastest || next_velocity < -fastest
         || played_acceleration > steepest || played_acceleration < -steepest;
 
+    // the only tick of a piece
+    wire signed [64:0] single = 65'(begin_velocity) + 65'(more);
+    wire signed [64:0] fast = 65'(fastest);
+    wire signed [63:0] steep = 64'(steepest);
+    wire single_beyond = single > fast || single < -fast || more > steep || more < -steep;
+
     assign busy = state != REST;
 
     always_ff @(posedge clk) begin
@@ -114,7 +123,16 @@ module set_point_piece (
                 more     <= more - 64'(begin_velocity);
                 changes  <= changes + 64'(change);
                 division <= 3'd0;
-                if (left == 8'd1) state <= PREPARE;
+                if (left == 8'd1) state <= ticks == 8'd1 ? SINGLE : PREPARE;
+            end
+            SINGLE: begin
+                acceleration    <= '0;
+                jerk            <= '0;
+                moved           <= single[63:0];
+                played_velocity <= single[49:0];
+                valid           <= 1'b1;
+                refused         <= single_beyond;
+                state           <= REST;
             end
             PREPARE: begin
                 negative  <= dividend[63];

@@ -122,6 +122,22 @@ module axis_registers #(
     input  wire         [ 2:0] built_filters,
     // SEGMENTS: most segments of the table; 0: none
     input  wire         [ 7:0] built_segments,
+    // HAS_SET_POINTS: player of streamed set-points
+    input  wire                built_set_points,
+    // 0 off, 1 prepared, without a set-point yet, 2 streaming, 3 extrapolating, 4 ended
+    input  wire         [ 2:0] stream_state_mode,
+    // how the last stream ended: 0 not, 1 released at rest, 2 stopped, 3 set-point late, 4 fault
+    input  wire         [ 2:0] stream_state_ended,
+    // why the last set-point was refused: 0 none was, 1 late, 2 limits, 3 out of travel, 4 queue
+    // full, 5 incomplete, 6 not streamed, 7 more than 255 ticks ahead
+    input  wire         [ 2:0] stream_state_refusal,
+    input  wire         [ 4:0] stream_state_room,               // set-points that can be committed
+    // ticks extrapolated since the stream began; wraps [tick]
+    input  wire         [15:0] stream_state_extrapolated,
+    // set-points since the stream began; the counts wrap: accepted
+    input  wire         [15:0] stream_counts_accepted,
+    input  wire         [ 7:0] stream_counts_late,              // late ones
+    input  wire         [ 7:0] stream_counts_refused,           // those refused for another cause
     // target - position, limited to 32 bits [1/65536 period]
     input  wire signed  [31:0] following_error,
     // command to the drive, full scale 2^15, after the interlock
@@ -156,6 +172,8 @@ module axis_registers #(
     logic        get_rejected_pulses;
     logic        get_rejected_samples;
     logic        get_built;
+    logic        get_stream_state;
+    logic        get_stream_counts;
     logic        get_following_error;
     logic        get_command;
 
@@ -176,11 +194,14 @@ module axis_registers #(
         {phase_amplitude, phase_phase}) | ({32{get_quadrature_count}} & quadrature_count) |
         ({32{get_encoder_events}} & {26'd0, encoder_events_held}) | ({32{get_rejected_pulses}} &
         {16'd0, rejected_pulses_count}) | ({32{get_rejected_samples}} & {16'd0,
-        rejected_samples_count}) | ({32{get_built}} & {8'd0, built_segments, built_filters,
-        built_fine_stage, built_dac, built_stepper, built_bridge, built_drive, built_velocity,
-        built_encoder_check, built_compare, built_capture, built_recorder, built_harmonics,
-        built_monitor, built_sine}) | ({32{get_following_error}} & following_error) |
-        ({32{get_command}} & {16'd0, command}) | {{16{(get_fault_position_high &&
+        rejected_samples_count}) | ({32{get_built}} & {7'd0, built_set_points, built_segments,
+        built_filters, built_fine_stage, built_dac, built_stepper, built_bridge, built_drive,
+        built_velocity, built_encoder_check, built_compare, built_capture, built_recorder,
+        built_harmonics, built_monitor, built_sine}) | ({32{get_stream_state}} &
+        {stream_state_extrapolated, 2'd0, stream_state_room, stream_state_refusal,
+        stream_state_ended, stream_state_mode}) | ({32{get_stream_counts}} & {stream_counts_refused,
+        stream_counts_late, stream_counts_accepted}) | ({32{get_following_error}} & following_error)
+        | ({32{get_command}} & {16'd0, command}) | {{16{(get_fault_position_high &&
         fault_position_high[15]) || (get_position_high && position_high[15]) || (get_target_high &&
         target_high[15]) || (get_command && command[15])}}, 16'd0};
 
@@ -204,6 +225,8 @@ module axis_registers #(
         get_rejected_pulses <= get && word == 6'h19;
         get_rejected_samples <= get && word == 6'h1A;
         get_built <= get && word == 6'h1B;
+        get_stream_state <= get && word == 6'h1E;
+        get_stream_counts <= get && word == 6'h1F;
         get_following_error <= get && word == 6'h27;
         get_command <= get && word == 6'h28;
         if (get_fault_position) fault_position_high <= fault_position[47:32];
@@ -268,6 +291,8 @@ module axis_registers #(
             get_rejected_pulses <= 1'b0;
             get_rejected_samples <= 1'b0;
             get_built <= 1'b0;
+            get_stream_state <= 1'b0;
+            get_stream_counts <= 1'b0;
             get_following_error <= 1'b0;
             get_command <= 1'b0;
             control_enable <= 2'h0;

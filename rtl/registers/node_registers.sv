@@ -10,33 +10,57 @@
 `default_nettype none
 
 module node_registers (
-    input  wire         clk,
-    input  wire         rst,                 // settings take their first values
-    input  wire         select,              // strobe: access to this block
-    input  wire         write,               // level: it writes wdata
-    input  wire  [ 5:0] word,                // index of the word
-    input  wire  [31:0] wdata,               // value to write
-    output logic [31:0] rdata,               // live bits read; else 0
-    input  wire  [31:0] clk_hz,              // frequency of clk [Hz]
-    input  wire  [ 3:0] build_axes,          // what is built: axes
-    input  wire  [ 3:0] build_address,       // what is built: address
-    input  wire  [ 7:0] build_memory,        // what is built: memory [1024 byte]
+    input  wire                clk,
+    input  wire                rst,                      // settings take their first values
+    input  wire                select,                   // strobe: access to this block
+    input  wire                write,                    // level: it writes wdata
+    input  wire         [ 5:0] word,                     // index of the word
+    input  wire         [31:0] wdata,                    // value to write
+    output logic        [31:0] rdata,                    // live bits read; else 0
+    input  wire         [31:0] clk_hz,                   // frequency of clk [Hz]
+    input  wire         [ 3:0] build_axes,               // what is built: axes
+    input  wire         [ 3:0] build_address,            // what is built: address
+    input  wire         [ 7:0] build_memory,             // what is built: memory [1024 byte]
+    // SCOPE_WORDS: words of the recorder of ticks; 0: there is none, and no excitation
+    input  wire         [ 8:0] build_scope,
     // cycles since reset; every time stamp is a part of it [cycle]
-    input  wire  [63:0] time_stamp,
+    input  wire         [63:0] time_stamp,
     // period of the servo tick; it is the same for all axes [cycle]
-    output logic [23:0] tick_period,
+    output logic        [23:0] tick_period,
     // period of the samples; it is the same for all ADCs [cycle]
-    output logic [15:0] sample_period,
+    output logic        [15:0] sample_period,
     // strobe: heartbeat of the firmware; while a drive is on, the longest time between two is 20 ms
     // and 1 200 000 cycles: kick
-    output logic        heartbeat_kick,
+    output logic               heartbeat_kick,
     // axes that start, bit n: axis n; they play their queued segments from the same tick on
-    output logic [ 7:0] start_axes,
-    output logic        start_axes_written,  // strobe: new value
+    output logic        [ 7:0] start_axes,
+    output logic               start_axes_written,       // strobe: new value
     // longest wait of the soft core; writing lets its next access to a register wait for this time,
     // or until a word of the bus is received [cycle]
-    output logic [23:0] wait_time,
-    output logic        wait_time_written    // strobe: new value
+    output logic        [23:0] wait_time,
+    output logic               wait_time_written,        // strobe: new value
+    output logic        [ 2:0] scope_axis,               // number of the axis
+    // bit n: 0 sine and cosine, 1 target, 2 target velocity, 3 velocity, 4 error, 5 command
+    output logic        [ 5:0] scope_signals,
+    output logic        [15:0] scope_samples_length,     // samples
+    // from sample to sample; 0 acts as 1 [tick]
+    output logic        [15:0] scope_samples_every,
+    // strobe: begins a recording, at the first value of a waveform that runs
+    output logic               scope_state_start,
+    input  wire                scope_state_recording,    // it is not complete
+    input  wire                scope_state_full,         // it is complete
+    // word of the recording; reading advances to the next one
+    input  wire         [31:0] scope_word,
+    output logic               scope_word_read,          // strobe: read in this cycle
+    input  wire         [31:0] tick_count,               // servo ticks since reset; wraps [tick]
+    output logic        [ 2:0] excitation_axis,          // number of the axis
+    // values of the waveform, one for each tick, 4096 at most; 0: nothing is added [tick]
+    output logic        [12:0] excitation_period,
+    // largest |command| with it, full scale 2^15
+    output logic        [14:0] excitation_limit,
+    output logic signed [15:0] excitation_value,         // full scale 2^15
+    output logic        [11:0] excitation_value_at,      // its number
+    output logic               excitation_value_written  // strobe: new value
 );
     logic [31:0] time_stamp_high;
     logic        get_map_crc;
@@ -44,17 +68,20 @@ module node_registers (
     logic        get_build;
     logic        get_time_stamp;
     logic        get_time_stamp_high;
+    logic        get_scope_state;
+    logic        get_scope_word;
+    logic        get_tick_count;
 
     wire         get = select && !write;
     wire         put = select && write;
-
-    // no register of this block has these bits
-    wire         unused = &{1'b0, wdata[31:24]};
+    assign scope_word_read = get_scope_word;
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'h29D1B31C) | ({32{get_clk_hz}} & clk_hz) |
-        ({32{get_build}} & {16'd0, build_memory, build_address, build_axes}) | ({32{get_time_stamp}}
-        & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high);
+    assign rdata = ({32{get_map_crc}} & 32'hC94CC514) | ({32{get_clk_hz}} & clk_hz) |
+        ({32{get_build}} & {7'd0, build_scope, build_memory, build_address, build_axes}) |
+        ({32{get_time_stamp}} & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high) |
+        ({32{get_scope_state}} & {29'd0, scope_state_full, scope_state_recording, 1'd0}) |
+        ({32{get_scope_word}} & scope_word) | ({32{get_tick_count}} & tick_count);
 
     always_ff @(posedge clk) begin
         get_map_crc <= get && word == 6'h00;
@@ -62,6 +89,9 @@ module node_registers (
         get_build <= get && word == 6'h02;
         get_time_stamp <= get && word == 6'h04;
         get_time_stamp_high <= get && word == 6'h05;
+        get_scope_state <= get && word == 6'h0E;
+        get_scope_word <= get && word == 6'h0F;
+        get_tick_count <= get && word == 6'h12;
         if (get_time_stamp) time_stamp_high <= time_stamp[63:32];
 
         if (put && word == 6'h06) tick_period <= wdata[23:0];
@@ -71,6 +101,17 @@ module node_registers (
         if (put && word == 6'h09) start_axes <= wdata[7:0];
         wait_time_written <= put && word == 6'h0A;
         if (put && word == 6'h0A) wait_time <= wdata[23:0];
+        if (put && word == 6'h0C) scope_axis <= wdata[2:0];
+        if (put && word == 6'h0C) scope_signals <= wdata[8:3];
+        if (put && word == 6'h0D) scope_samples_length <= wdata[15:0];
+        if (put && word == 6'h0D) scope_samples_every <= wdata[31:16];
+        scope_state_start <= put && word == 6'h0E && wdata[0];
+        if (put && word == 6'h18) excitation_axis <= wdata[2:0];
+        if (put && word == 6'h18) excitation_period <= wdata[15:3];
+        if (put && word == 6'h18) excitation_limit <= wdata[30:16];
+        excitation_value_written <= put && word == 6'h19;
+        if (put && word == 6'h19) excitation_value <= wdata[15:0];
+        if (put && word == 6'h19) excitation_value_at <= wdata[27:16];
 
         if (rst) begin
             get_map_crc <= 1'b0;
@@ -78,6 +119,9 @@ module node_registers (
             get_build <= 1'b0;
             get_time_stamp <= 1'b0;
             get_time_stamp_high <= 1'b0;
+            get_scope_state <= 1'b0;
+            get_scope_word <= 1'b0;
+            get_tick_count <= 1'b0;
             time_stamp_high <= '0;
             tick_period <= 24'h000000;
             sample_period <= 16'h0000;
@@ -86,6 +130,17 @@ module node_registers (
             start_axes <= 8'h00;
             wait_time_written <= 1'b0;
             wait_time <= 24'h000000;
+            scope_axis <= 3'h0;
+            scope_signals <= 6'h00;
+            scope_samples_length <= 16'h0001;
+            scope_samples_every <= 16'h0001;
+            scope_state_start <= 1'b0;
+            excitation_axis <= 3'h0;
+            excitation_period <= 13'h0000;
+            excitation_limit <= 15'h0000;
+            excitation_value_written <= 1'b0;
+            excitation_value <= 16'h0000;
+            excitation_value_at <= 12'h000;
         end
     end
 endmodule

@@ -23,6 +23,7 @@ module register_layout #(
     parameter int HAS_HARMONICS = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_MONITOR = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_RECORDER = 255,  // bit n: axis n has it, else its settings are 0
+    parameter int HAS_SET_POINTS = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_SINE = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_STEPPER = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_VELOCITY = 255,  // bit n: axis n has it, else its settings are 0
@@ -57,6 +58,7 @@ module register_layout #(
     wire               has_harmonics = 1'(HAS_HARMONICS >> axis);
     wire               has_monitor = 1'(HAS_MONITOR >> axis);
     wire               has_recorder = 1'(HAS_RECORDER >> axis);
+    wire               has_set_points = 1'(HAS_SET_POINTS >> axis);
     wire               has_sine = 1'(HAS_SINE >> axis);
     wire               has_stepper = 1'(HAS_STEPPER >> axis);
     wire               has_velocity = 1'(HAS_VELOCITY >> axis);
@@ -101,35 +103,43 @@ module register_layout #(
 
     always_comb begin
         case (entry)
-            9'h0EC, 9'h0EE, 9'h11E, 9'h120, 9'h12E, 9'h130, 9'h146: low = 1'b1;
+            9'h0EC, 9'h0EE, 9'h0F8, 9'h0FA, 9'h0FC, 9'h11E, 9'h120, 9'h12E, 9'h130, 9'h146: low =
+                1'b1;
             default: low = 1'b0;
         endcase
         case (entry)
             9'h0ED, 9'h0EF: high = has_drive;
+            9'h0F9, 9'h0FB, 9'h0FD: high = has_set_points;
             9'h11F, 9'h121: high = has_compare;
             9'h147: high = has_stepper;
             default: high = 1'b0;
         endcase
         case (entry)
             9'h006, 9'h090: mask = 32'h00FFFFFF;
-            9'h007, 9'h04C, 9'h084, 9'h099: mask = 32'h0000FFFF;
+            9'h007, 9'h013, 9'h04C, 9'h084, 9'h099: mask = 32'h0000FFFF;
+            9'h00C: mask = 32'h000001FF;
+            9'h00D, 9'h010, 9'h014, 9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
+            9'h011, 9'h015, 9'h050, 9'h102: mask = 32'h000000FF;
+            9'h018: mask = 32'h7FFFFFFF;
             9'h040, 9'h08A, 9'h08F, 9'h100: mask = 32'h000FFFFF;
-            9'h050, 9'h102: mask = 32'h000000FF;
-            9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
             9'h0C0: mask = (has_drive ? 32'h0000003F : 32'd0);
             9'h0C8, 9'h0ED, 9'h0EF, 9'h0F0, 9'h0F2, 9'h0F3, 9'h0F5, 9'h0F6, 9'h0F7: mask =
                 (has_drive ? 32'hFFFFFFFF : 32'd0);
+            9'h0C9: mask = 32'h00FFFF1F;
             9'h0D1: mask = 32'h0000003F | (has_sine ? 32'hFFFF0000 : 32'd0);
             9'h0D2, 9'h113, 9'h114, 9'h116, 9'h117: mask = (has_monitor ? 32'hFFFFFFFF : 32'd0);
             9'h0D3: mask = (has_sine ? 32'h000FFFFF : 32'd0);
             9'h0D8: mask = 32'h0000003F;
             9'h0DC, 9'h0E5: mask = (has_drive ? 32'h00007FFF : 32'd0);
+            9'h0DD: mask = (has_set_points ? 32'h7FFFFFFF : 32'd0);
             9'h0E0, 9'h0E1, 9'h0E2, 9'h0E3, 9'h0E4: mask = (has_drive ? 32'h00FFFFFF : 32'd0);
             9'h0E6, 9'h0E9: mask = (has_drive ? 32'h0000FFFF : 32'd0);
             9'h0EA: mask = (filters ? 32'h0000001F : 32'd0);
             9'h0EB: mask = (filters ? 32'hFFFFFFFF : 32'd0);
             9'h0F1: mask = (has_drive ? 32'h01FFFFFF : 32'd0);
             9'h0F4: mask = (has_drive ? 32'h0001FFFF : 32'd0);
+            9'h0F9, 9'h0FB, 9'h0FD: mask = (has_set_points ? 32'h0000FFFF : 32'd0);
+            9'h0FE, 9'h0FF: mask = (has_set_points ? 32'hFFFFFFFF : 32'd0);
             9'h101, 9'h12A, 9'h140: mask = 32'h00000003;
             9'h103: mask = (has_encoder_check ? 32'hFFFFFFFF : 32'd0);
             9'h108: mask = (has_sine ? 32'hFFFFFFFF : 32'd0);
@@ -157,6 +167,7 @@ module register_layout #(
         endcase
         case (entry)
             9'h0E9: sign = has_drive && wdata[15];
+            9'h0F9, 9'h0FB, 9'h0FD: sign = has_set_points && wdata[15];
             9'h10A: sign = has_sine && wdata[16];
             9'h11F, 9'h121: sign = has_compare && wdata[15];
             9'h12B: sign = wdata[2];
@@ -165,6 +176,7 @@ module register_layout #(
             default: sign = '0;
         endcase
         case (entry)
+            9'h00D: first = 32'h00010001;
             9'h040, 9'h08A, 9'h08F: first = 32'h0000022B;
             9'h04C: first = 32'h000003E8;
             9'h084: first = 32'h0000012C;

@@ -30,8 +30,8 @@ module register_width (
         // actuator, of up to 8 axes
         if (block >= 8'h14 && block < 8'h1C) kind = 3'd5;
         case (entry)
-            9'h004, 9'h092, 9'h0C6, 9'h0CA, 9'h0CC, 9'h0EC, 9'h0EE, 9'h11C, 9'h11E, 9'h120, 9'h12E,
-                9'h130, 9'h146: low = 1'b1;
+            9'h004, 9'h092, 9'h0C6, 9'h0CA, 9'h0CC, 9'h0EC, 9'h0EE, 9'h0F8, 9'h0FA, 9'h0FC, 9'h11C,
+                9'h11E, 9'h120, 9'h12E, 9'h130, 9'h146: low = 1'b1;
             default: low = 1'b0;
         endcase
     end

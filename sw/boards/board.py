@@ -40,6 +40,21 @@ class Pad:
 
 
 @dataclass(frozen=True)
+class Loader:
+    """How openFPGALoader reaches the part and its flash."""
+
+    board: str  # its name of the board
+    cable: str  # its name of the cable; empty: that of the board
+    sram: bool  # False: the part takes its configuration from the flash only
+    flash_offset: int  # byte address of the bitstream in the flash
+
+    @property
+    def target(self) -> str:
+        """The target of make that loads a bitstream."""
+        return "load" if self.sram else "flash"
+
+
+@dataclass(frozen=True)
 class Board:
     """A board file that has been checked by itself."""
 
@@ -48,7 +63,7 @@ class Board:
     title: str
     layout: str  # boards of one layout have the same connectors
     sources: list[str]
-    loader: str
+    loader: Loader
     part: Part
     clock: Pad
     clock_hz: int
@@ -102,6 +117,17 @@ def part_of(table: Table) -> Part:
     if not package_pins(family, part.device, part.package):
         raise table.misfit(f"a {family} {part.device} has no package {part.package}")
     return part
+
+
+def loader_of(table: Table) -> Loader:
+    loader = Loader(
+        table.take("board", str),
+        table.take("cable", str, ""),
+        table.take("sram", bool, True),
+        table.take("flash_offset", int, 0),
+    )
+    table.close()
+    return loader
 
 
 def pull_of(table: Table) -> str:
@@ -179,7 +205,7 @@ def load(path: Path) -> Board:
         title=title,
         layout=table.take("layout", str),
         sources=table.words("sources"),
-        loader=table.take("loader", str),
+        loader=loader_of(table.table("loader", True)),
         part=part_of(table.table("part", True)),
         clock=Pad(clock.take("pin", str), "clock", "in"),
         clock_hz=clock.take("hz", int),

@@ -5,7 +5,10 @@ build/boards/x-y/ gets top.sv, the constraints (pins.lpf or pins.pcf), wiring.ht
 firmware and moire.bit. The machine is one of constraints/machines, or a .toml file anywhere. What
 does not fit is refused in one line before any tool runs; the exit code is 1 then.
 
-python -m boards.build --board x --machine y [--only-files]
+A firmware in block RAM is put into the placed design (block_ram.py): with new firmware only,
+nothing is placed again. `--firmware` (`make firmware`) does this alone, and refuses to place.
+
+python -m boards.build --board x --machine y [--only-files | --firmware]
 """
 
 import argparse
@@ -13,16 +16,18 @@ import hashlib
 import json
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from boards import board as boards
 from boards import machine as machines
+from boards.block_ram import ContentsError
 from boards.board import Board
 from boards.family import Placer
 from boards.fit import Design, fit
-from boards.generate import files
+from boards.generate import files, placeholder
 from boards.machine import Machine
 from boards.size import firmware_stem
 from boards.toml_file import ROOT, Misfit, TooLarge, shown
@@ -30,6 +35,7 @@ from figures.synthesis import SynthesisError, placed, run, yosys
 from firmware import build as firmware
 
 OUT = ROOT / "build" / "boards"
+PLACED, FILLED = "placed", "filled"  # files of nextpnr: with the placeholder, with the firmware
 KINDS = {  # of cells of a 7-series part, by the beginning of their names
     "LUT": "LUT",
     "FD": "flip-flops",
@@ -127,18 +133,47 @@ def pinned(design: Design, folder: Path) -> list[str | Path]:
 def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float, dict[str, Any]]:
     """(MHz, utilization) after place and route; a clock that is not reached is a result."""
     by, mhz = placer(design), design.board.node_hz / 1e6
-    written = by.made(folder.relative_to(ROOT) / "placed")
+    written = by.made(folder.relative_to(ROOT) / PLACED)
     return placed(netlist, by.nextpnr, chip(design), mhz, seed, *pinned(design, folder), *written)
+
+
+def counted(design: Design, folder: Path, netlist: Path) -> dict[str, Any]:
+    """The utilization of the part after packing, without a placement: {cell: {used, available}}."""
+    by, mhz = placer(design), design.board.node_hz / 1e6
+    more = (*pinned(design, folder), "--pack-only")
+    return placed(netlist, by.nextpnr, chip(design), mhz, 1, *more)[1]
+
+
+def program_of(design: Design, folder: Path) -> Path:
+    """The file of the firmware that a bitstream is made with: its bytes for the flash of a serial
+    core, else words for the block RAMs.
+    """
+    end = "bin" if design.machine.core == "serial" else "hex"
+    return folder / f"{firmware_stem(design.machine)}.{end}"
+
+
+def fill(design: Design, folder: Path) -> str:
+    """Puts the firmware in the place of the placeholder; the name of the file that is packed."""
+    contents = placer(design).contents
+    if not design.in_block_ram or contents is None:
+        return PLACED
+    words = [int(word, 16) for word in program_of(design, folder).read_text().split()]
+    text = (folder / PLACED).read_text()
+    try:
+        (folder / FILLED).write_text(contents.filled(text, placeholder(design), words))
+    except ContentsError as why:
+        raise SynthesisError(f"the firmware of {design.name} cannot be replaced: {why}") from None
+    return FILLED
 
 
 def pack(design: Design, folder: Path) -> Path:
     """The bitstream; for a serial core the image of the flash, with the firmware behind it."""
     part, here = design.board.part, folder.relative_to(ROOT)
     made = folder / part.family.bitstream
-    words = placer(design).pack(part, here / "placed", made.relative_to(ROOT))
+    words = placer(design).pack(part, here / fill(design, folder), made.relative_to(ROOT))
     run(words, "packing", folder / "pack.log")
     if design.machine.core == "serial":
-        program = (folder / f"{firmware_stem(design.machine)}.bin").read_bytes()
+        program = program_of(design, folder).read_bytes()
         content, start = made.read_bytes(), design.firmware_address
         if len(content) > start:
             raise SynthesisError(
@@ -166,32 +201,47 @@ def cells(netlist: Path) -> str:
     return ", ".join(f"{found[words]} {words}" for words in KINDS.values() if found[words])
 
 
-def state(folder: Path, made: Sequence[str]) -> str:
-    """A hash of all that goes into the bitstream."""
+def state(design: Design) -> str:
+    """A hash of all that the placement depends on, except its seed."""
     sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", Path(__file__)]
     sources += [Path(__file__).with_name(name) for name in ("family.py", "gowin.lock")]
-    sources += [folder / name for name in made] + sorted(folder.glob("*.hex"))
     found = hashlib.sha256()
     for path in sources:
         found.update(path.name.encode() + path.read_bytes())
+    for name, text in files(design).items():
+        found.update(name.encode() + text.encode())
     return found.hexdigest()
 
 
-def bitstream(design: Design, seed: int, say: Callable[[str], None]) -> Path:
-    """The bitstream of a machine on a board; nothing is built if nothing has changed."""
-    check_tools(design)
-    folder, node_mhz = write(design), design.board.node_hz / 1e6
-    say(f"--- {design.name}: wiring: {shown(folder / 'wiring.html')}")
-    say(make_firmware(design, folder))
-    if design.board.part.family.placer is None:
-        say(f"--- {design.name}: synthesis")
-        say(cells(synthesise(design, folder)))
-        return folder / design.board.part.family.script
-    note, now = folder / "note", f"{state(folder, list(files(design)))} seed {seed}"
-    made = folder / design.board.part.family.bitstream
-    if made.is_file() and note.is_file() and note.read_text() == now:
-        return made
-    note.unlink(missing_ok=True)
+@dataclass(frozen=True)
+class Note:
+    """What the bitstream in a folder was made of; an empty text is no bitstream or no placement."""
+
+    placement: str = ""  # its state
+    seed: str = ""
+    program: str = ""  # hash of the firmware in the bitstream
+
+    @classmethod
+    def read(cls, folder: Path) -> "Note":
+        file = folder / "note"
+        lines = file.read_text().split() if file.is_file() and (folder / PLACED).is_file() else []
+        return cls(*lines[:3])
+
+    def write(self, folder: Path) -> None:
+        (folder / "note").write_text(f"{self.placement} {self.seed} {self.program}\n")
+
+
+def program_hash(design: Design, folder: Path) -> str:
+    """A hash of the firmware; `none` for a relay."""
+    if not design.machine.image:
+        return "none"
+    return hashlib.sha256(program_of(design, folder).read_bytes()).hexdigest()
+
+
+def placed_again(design: Design, folder: Path, seed: int, say: Callable[[str], None]) -> None:
+    """Synthesis and placement; a missed clock is refused."""
+    node_mhz = design.board.node_hz / 1e6
+    (folder / "note").unlink(missing_ok=True)
     say(f"--- {design.name}: synthesis")
     netlist = synthesise(design, folder)
     say(f"--- {design.name}: place and route for {node_mhz:g} MHz")
@@ -202,9 +252,57 @@ def bitstream(design: Design, seed: int, say: Callable[[str], None]) -> Path:
             f"{design.name} reaches {mhz:.1f} MHz with seed {seed} and needs {node_mhz:g}: try "
             "another SEED"
         )
-    pack(design, folder)
-    note.write_text(now)
+
+
+def packed(design: Design, folder: Path, placement: Note, say: Callable[[str], None]) -> Path:
+    """The bitstream of a placement with the firmware that is there; it is made again only if the
+    firmware is another one.
+    """
+    made, now = folder / design.board.part.family.bitstream, program_hash(design, folder)
+    if placement.program != now or not made.is_file():
+        say(f"--- {design.name}: bitstream")
+        pack(design, folder)
+        replace(placement, program=now).write(folder)
     return made
+
+
+def bitstream(design: Design, seed: int, say: Callable[[str], None]) -> Path:
+    """The bitstream of a machine on a board; nothing is built if nothing has changed."""
+    check_tools(design)
+    folder = write(design)
+    say(f"--- {design.name}: wiring: {shown(folder / 'wiring.html')}")
+    say(make_firmware(design, folder))
+    if design.board.part.family.placer is None:
+        say(f"--- {design.name}: synthesis")
+        say(cells(synthesise(design, folder)))
+        return folder / design.board.part.family.script
+    note, now = Note.read(folder), Note(state(design), str(seed))
+    if (note.placement, note.seed) != (now.placement, now.seed):
+        placed_again(design, folder, seed, say)
+        now.write(folder)
+        note = now
+    return packed(design, folder, note, say)
+
+
+def new_firmware(design: Design, say: Callable[[str], None]) -> Path:
+    """The bitstream of a placement that is there with new firmware; nothing is placed."""
+    folder = OUT / design.name
+    if not design.machine.image:
+        raise Misfit(f"{design.machine.file}: a relay has no firmware")
+    if design.board.part.family.placer is None:
+        raise Misfit(
+            f"{design.board.file}: the firmware is part of the netlist of a "
+            f"{design.board.part.name}: make board {design.arguments} makes both"
+        )
+    check_tools(design)
+    note = Note.read(folder)
+    if note.placement != state(design):
+        raise Misfit(
+            f"{shown(folder)} has no placement of this board, machine and RTL: make board "
+            f"{design.arguments} makes it"
+        )
+    say(make_firmware(design, folder))
+    return packed(design, folder, note, say)
 
 
 def chosen(board_name: str, machine_name: str) -> tuple[Board, Machine]:
@@ -220,7 +318,11 @@ def main() -> None:
     parser.add_argument("--board", default="", help="a folder of constraints/")
     parser.add_argument("--machine", default="", help="a name of constraints/machines, or a file")
     parser.add_argument("--seed", type=int, default=1, help="of the placement")
-    parser.add_argument("--only-files", action="store_true", help="run no tool")
+    only = parser.add_mutually_exclusive_group()
+    only.add_argument("--only-files", action="store_true", help="run no tool")
+    only.add_argument(
+        "--firmware", action="store_true", help="new firmware into the placement that is there"
+    )
     options = parser.parse_args()
     say = lambda words: print(words, flush=True)
     try:
@@ -228,17 +330,21 @@ def main() -> None:
         if options.only_files:
             print(shown(write(design)))
             return
-        made = bitstream(design, options.seed, say)
+        if options.firmware:
+            made = new_firmware(design, say)
+        else:
+            made = bitstream(design, options.seed, say)
     except (Misfit, SynthesisError) as why:
         sys.exit(f"board: {why}")
-    part, bits = design.board.part, made.with_name(design.board.part.family.bitstream)
-    if part.family.placer is None:
+    family = design.board.part.family
+    if family.placer is None:
         print(
-            f"no open tool places a {part.name}: vivado -mode batch -source {shown(made)} makes "
-            f"{shown(bits)}; load it with: {design.board.loader} {shown(bits)}"
+            f"no open tool places a {design.board.part.name}: vivado -mode batch -source "
+            f"{shown(made)} makes {shown(made.with_name(family.bitstream))}"
         )
-        return
-    print(f"{shown(made)}; load it with: {design.board.loader} {shown(made)}")
+    else:
+        print(shown(made))
+    print(f"load it: make {design.board.loader.target} {design.arguments}")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from boards import clocks
+from boards import block_ram, clocks
 from boards.clocks import Pll
 from boards.packages import PACKAGES
 from boards.toml_file import Misfit
@@ -28,6 +28,7 @@ class Placer:
     made: Callable[[Path], list[str]]  # options for the file that is packed
     pack: Callable[["Part", Path, Path], list[object]]  # command: from that file to the bitstream
     used: Mapping[str, str]  # words, and cells of nextpnr's report
+    contents: block_ram.Format | None = None  # of the placed file; None: no firmware is in it
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,12 @@ def lattice_chip(part: Part) -> list[str]:
 
 
 def lattice(
-    nextpnr: Sequence[object], tool: Sequence[str], pins: str, made: str, used: Mapping[str, str]
+    nextpnr: Sequence[object],
+    tool: Sequence[str],
+    pins: str,
+    made: str,
+    used: Mapping[str, str],
+    contents: block_ram.Format | None = None,
 ) -> Placer:
     """The placer of a Lattice family: nextpnr, its packer, options of nextpnr, and cells."""
     return Placer(
@@ -102,6 +108,7 @@ def lattice(
         made=lambda file: [made, str(file)],
         pack=lambda part, placed, bits: [TOOLS / tool[0], *tool[1:], *part.pack, placed, bits],
         used=used,
+        contents=contents,
     )
 
 
@@ -122,6 +129,7 @@ FAMILIES = {
                 "--lpf",
                 "--textcfg",
                 {"LUT": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAM": "DP16KD"},
+                block_ram.ECP5,
             ),
         ),
         Family(
@@ -162,6 +170,7 @@ FAMILIES = {
                     **{"LUT": "LUT4", "carry cells": "ALU", "LUT RAM": "RAM16SDP4"},
                     **{"flip-flops": "DFF", "block RAM": "BSRAM"},
                 },
+                contents=block_ram.GOWIN,
             ),
             bitstream="moire.fs",
             fetched="gowin",

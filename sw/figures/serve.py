@@ -13,10 +13,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing import get_context
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -41,6 +42,8 @@ PATIENCE_S = 120  # of the clock: a slow twin is not a dead one
 READ_S = START_S = 3.0
 STREAMS = 20
 BAD = 100_000
+PROCESSES = 4  # of each kind, in so many processes: the answers take longer than the questions
+EXAMPLES = 2000  # of one run of Hypothesis, which remembers all of them
 LOOK = 200  # bad messages between two looks at the drive
 CALLS = 11  # of the command line
 HANG_S = 20
@@ -282,10 +285,17 @@ PARTS = strategies.sampled_from(
 )
 RAW = strategies.lists(PARTS | strategies.binary(max_size=8), min_size=1, max_size=16).map(b"".join)
 QUERIES = strategies.dictionaries(NAMES | strategies.text(max_size=9), strategies.text(max_size=9))
-PATHS = strategies.sampled_from([operation.path for operation in OPERATIONS]).flatmap(
-    lambda path: strategies.tuples(
-        *(strategies.sampled_from(("1", "0", "2", "-1", "x", "99999", "velocity", "%00")),) * 3
-    ).map(lambda names: path.format(node=names[0], axis=names[1], name=names[2]))
+PARTS_OF_PATHS = ("1", "0", "2", "-1", "x", "99999", "velocity", "%00")
+PATHS = strategies.sampled_from(
+    sorted(
+        {
+            operation.path.format(node=node, axis=axis, name=name)
+            for operation in OPERATIONS
+            for node in PARTS_OF_PATHS
+            for axis in PARTS_OF_PATHS
+            for name in PARTS_OF_PATHS
+        }
+    )
 )
 FRAMES = strategies.binary(min_size=1, max_size=40)
 
@@ -324,7 +334,7 @@ class Target:
             if state != "off":
                 self.note(f"the drive is {state}", "")
         except (MoireError, OSError, http.client.HTTPException, ValueError) as error:
-            self.note(f"the server is dead: {error}", "")
+            raise NotMeasured(f"the server is dead after {self.sent} messages: {error}") from None
 
     def judge(self, status: int, body: bytes, sent: object) -> None:
         """An answer is done, or an error with its cause; never a defect of the server."""
@@ -339,7 +349,15 @@ class Target:
         elif error.get("cause") == "internal":
             self.note("a defect", sent)
 
-    # three kinds of input
+    def close(self) -> None:
+        """Ends the connections that are kept, which other processes cannot take over."""
+        if self.kept is not None:
+            self.kept.close()
+        if self.stream is not None:
+            self.stream.close()
+        self.kept = self.stream = None
+
+    # four kinds of input
 
     def raw(self, data: bytes) -> None:
         """Bytes that are hardly HTTP, on a connection of their own, which is then closed."""
@@ -381,6 +399,7 @@ class Target:
         except (OSError, http.client.HTTPException) as error:
             if is_new:
                 self.note(f"the connection ends: {error}", (method, target, body))
+                self.look()
         else:
             return
         self.kept.close()
@@ -428,26 +447,36 @@ def is_valid(operation: Operation, values: Any) -> bool:
         return False
 
 
-def harmless(method: str, path: str, body: Any) -> bool:
-    """Whether a request must be refused, or only reads."""
+def is_wrong(method: str, path: str, query: Any, body: Any) -> bool:
+    """Whether a request must be refused: it names what is not there, or its fields are wrong."""
     found, _ = find(method, path)
-    if found is None or not found[0].changes:
+    if found is None:
         return True
-    return not is_valid(found[0], {} if body in ("", None) else body)
+    operation, names = found
+    if any(names.get(name, there) != there for name, there in THERE.items()):
+        return True
+    values = body if operation.changes else query
+    return not is_valid(operation, {} if values in ("", None) else values)
 
 
-def harmless_message(message: Any) -> bool:
+def is_wrong_message(message: Any) -> bool:
     """The same for a message of a WebSocket."""
     if not isinstance(message, dict) or "stream" in message:
         return True
-    method, path = message.get("method"), message.get("path")
+    method, path, body = (message.get(name) for name in ("method", "path", "body"))
     if not isinstance(method, str) or not isinstance(path, str):
         return True
-    return harmless(method, path, message.get("body"))
+    return is_wrong(method, path, body, body)
 
 
 METHODS = strategies.sampled_from(("GET", "POST", "PUT", "PATCH", "DELETE"))
-REQUEST = strategies.tuples(METHODS, PATHS, QUERIES, ANYTHING)
+THERE = {"node": "1", "axis": "0", "name": "velocity"}  # of the twin
+TOGETHER = 10  # requests with one query and one body, which take longest to make
+REQUEST_GROUPS = strategies.tuples(
+    strategies.lists(strategies.tuples(METHODS, PATHS), min_size=TOGETHER, max_size=TOGETHER),
+    QUERIES,
+    ANYTHING,
+).map(lambda made: [(*one, *made[1:]) for one in made[0] if is_wrong(*one, *made[1:])])
 MESSAGE = (
     strategies.fixed_dictionaries(
         {"method": METHODS | ANYTHING, "path": PATHS | ANYTHING},
@@ -457,41 +486,71 @@ MESSAGE = (
     | strategies.text(max_size=30)
     | strategies.binary(max_size=30)
 )
-INPUT: dict[str, tuple[float, strategies.SearchStrategy[Any]]] = {  # share of all, and what it is
-    "asked": (0.4, REQUEST.filter(lambda one: harmless(one[0], one[1], one[3]))),
-    "message": (0.4, MESSAGE.filter(harmless_message)),
-    "raw": (0.15, RAW),
-    "frames": (0.05, FRAMES),
+
+
+def alone(one: Any) -> list[Any]:
+    """A message that goes with no others."""
+    return [one]
+
+
+# share of all, and lists of what it is
+INPUT: dict[str, tuple[float, strategies.SearchStrategy[list[Any]]]] = {
+    "asked": (0.4, REQUEST_GROUPS),
+    "message": (0.4, MESSAGE.filter(is_wrong_message).map(alone)),
+    "raw": (0.15, RAW.map(alone)),
+    "frames": (0.05, FRAMES.map(alone)),
 }
 
 
 def send_all(
-    take: Callable[[Any], None], bad: strategies.SearchStrategy[Any], count: int, seed: int
+    take: Callable[[Any], None], bad: strategies.SearchStrategy[list[Any]], count: int, seed: int
 ) -> None:
     """Passes so many inputs of a kind on."""
     set_hypothesis_home_dir(ROOT / "build" / "hypothesis")
-    limited = hypothesis.settings(
-        max_examples=count,
+    sent = 0
+
+    def send(several: list[Any]) -> None:
+        nonlocal sent
+        for one in several[: count - sent]:
+            take(one)
+            sent += 1
+
+    while sent < count:  # an example may have several inputs, or none
+        hypothesis.seed(seed + sent)(limited(count - sent)(hypothesis.given(several=bad)(send)))()
+
+
+def limited(examples: int) -> hypothesis.settings:
+    """Makes at most so many examples, and only makes them."""
+    return hypothesis.settings(
+        max_examples=min(examples, EXAMPLES),
         database=None,
         deadline=None,
         phases=[hypothesis.Phase.generate],
         suppress_health_check=list(hypothesis.HealthCheck),
     )
 
-    def send(one: Any) -> None:
-        take(one)
 
-    hypothesis.seed(seed)(limited(hypothesis.given(one=bad)(send)))()
+def of_one_kind(url: str, name: str, count: int, seed: int) -> Target:
+    """So many messages of one kind to the server at a URL."""
+    target = Target(url)
+    send_all(getattr(target, name), INPUT[name][1], count, seed)
+    target.look()
+    target.close()
+    return target
 
 
 def serve_bad_input(messages: int = BAD, seed: int = 1) -> int:
-    with served() as ports:
-        target = Target(ports["http"])
-        for name, (share, bad) in INPUT.items():
-            send_all(getattr(target, name), bad, round(messages * share), seed)
-        target.look()
-    console.print(f"{target.sent} messages; {len(target.failed)} with a wrong effect")
-    return len(target.failed)
+    parts = [
+        (name, round(messages * share / PROCESSES), seed + part)
+        for part in range(PROCESSES)
+        for name, (share, _) in INPUT.items()
+    ]
+    with served() as ports, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        jobs = [pool.submit(of_one_kind, ports["http"], *part) for part in parts]
+        done = [job.result() for job in jobs]
+    sent, failed = sum(one.sent for one in done), sum(len(one.failed) for one in done)
+    console.print(f"{sent} messages; {failed} with a wrong effect")
+    return failed
 
 
 FIGURES = {

@@ -3,9 +3,13 @@
 then advances one cycle.
 """
 
+from tables.engine_microcode import SETTINGS
+from tables.engine_words import SEGMENT
 from tb.control.engine_words import FOUND
 
 WORD = 1 << 32
+PARTS = [SETTINGS[SEGMENT + name] for name in ("velocity", "acceleration", "jerk", "ticks")]
+OFFERED = 2  # cycles that a word of a piece is offered before it is taken
 
 
 def signed(value, bits):
@@ -23,11 +27,15 @@ class EngineBus:
         self.pushes, self.filter_at, self.axis, self.of_gain = False, 0, 0, False
         self.gains = self.push = 0  # bits of axes
         self.shift_by = None
+        self.offered = 0  # cycles in which a word of a piece was offered
 
-    def waits(self, ready=1, setting_waits=0, pending=0, moves=0, moved=0):
-        """(hold, waits)"""
+    def waits(self, ready=1, setting_waits=0, pending=0, moves=0, moved=0, stores=0, piece=None):
+        """(hold, waits, settled, piece_taken)"""
         hold = bool(self.scaled or self.setting) or setting_waits or self.pushes or not ready
-        return int(hold), int(hold or self.push | pending | moves | moved > 0)
+        settled = not (hold or self.push | pending | moves | moved > 0)
+        waits = not settled or piece is not None
+        self.taken = bool(piece and self.offered == OFFERED and settled and not stores)
+        return int(hold), int(waits), int(settled), int(self.taken)
 
     def word_of(self, address):
         """(axis, word) of an address of the map, or None."""
@@ -52,9 +60,11 @@ class EngineBus:
         setting_waits=0,
         moved=0,
         moved_by=(),
+        streamed=0,
+        piece=None,
         rst=0,
     ):
-        """Advance one cycle. moved: bits of axes."""
+        """Advance one cycle. moved, streamed: bits of axes. piece: (axis, part, word) or None."""
         if rst:
             self.reset()
             return
@@ -66,11 +76,18 @@ class EngineBus:
         self.pushes = self.pushes and not done
         self.gains, self.setting = 0, None
         self.shift()
+        self.offered = 0 if self.taken or not piece else min(self.offered + 1, OFFERED)
+        if self.taken:
+            self.axis, part, value = piece
+            self.setting = self.axis, PARTS[part], None, value
+            self.pushes = part == len(PARTS) - 1
         axis, word = self.word_of(address)
         filter_at = self.filter_at
         if stores and word and axis < self.axes and word.name == "filter_address":
             self.filter_at = value & 31
         if not stores or not word or word.name == "filter_address" or axis >= self.axes:
+            return
+        if word.name.startswith(SEGMENT) and streamed >> axis & 1:
             return
         number = word.at ^ 0x10
         if word.name == "filter_value":

@@ -18,6 +18,10 @@ def piece_of(begin, set_point, ticks, limits):
     if abs(gap) >= FARTHEST:
         return 1, None
     more = gap - (velocity >> 1) - begin_velocity * ticks
+    if ticks == 1:
+        single = begin_velocity + more
+        fits = abs(single) <= limits[0] and abs(more) <= limits[1]
+        return 3, (0, 0, begin_position + single, single) if fits else None
     change = velocity - begin_velocity
     cycles = 1 + ticks + 1 + 2 * DIGITS
     acceleration = 2 * (3 * more - (ticks - 2) * change) // (ticks * (ticks + 1))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""engine_bus: settings in the units of the engine, the push of a segment, what the soft core waits
-for, and random words against the model in every cycle.
+"""engine_bus: settings in the units of the engine, the push of a segment, pieces of a stream, what
+the soft core waits for, and random words against the model in every cycle.
 """
 
 import random
@@ -18,7 +18,8 @@ from tb.registers.register_layout import RegisterLayout
 
 IDLE = dict(stores=0, address=0, value=0, value_low=0, setting_waits=0, pending=0, moves=0, moved=0)
 MOST = 17  # cycles from stores to setting_write
-LEVELS = ("setting_waits", "pending", "moves", "moved")
+LEVELS = ("setting_waits", "pending", "moves", "moved", "stores")
+PIECE = ("piece_axis", "piece_part", "piece_word")
 
 
 def address_of(block, register, axis=0):
@@ -34,33 +35,40 @@ class Bus:
         self.model = EngineBus(self.axes, int(dut.FILTERS.value))
 
     async def reset(self):
-        await start(self.dut, **IDLE, ready=1, moved_by=0)
+        no_piece = dict.fromkeys((*PIECE, "piece_valid", "streamed"), 0)
+        await start(self.dut, **IDLE, **no_piece, ready=1, moved_by=0)
         await FallingEdge(self.dut.clk)
         return self
 
-    async def clk(self, rst=0, ready=1, moved_by=None, **inputs):
-        """Advance one cycle; returns (hold, waits) in it."""
+    async def clk(self, rst=0, ready=1, moved_by=None, streamed=0, piece=None, **inputs):
+        """Advance one cycle; returns (hold, waits) in it. piece: (axis, part, word) or None."""
         dut, model = self.dut, self.model
         inputs, moved_by = IDLE | inputs, moved_by or [0] * self.axes
         for name, level in inputs.items():
             getattr(dut, name).value = level
-        dut.rst.value, dut.ready.value = rst, ready
+        dut.rst.value, dut.ready.value, dut.streamed.value = rst, ready, streamed
+        dut.piece_valid.value = int(piece is not None)
+        for name, level in zip(PIECE, piece or ()):
+            getattr(dut, name).value = level
         dut.moved_by.value = sum((by & (1 << 48) - 1) << 48 * n for n, by in enumerate(moved_by))
         await Timer(1, "ns")
-        waits = model.waits(ready, **{name: inputs[name] for name in LEVELS})
-        assert (int(dut.hold.value), int(dut.waits.value)) == waits
+        levels = model.waits(ready, piece=piece, **{name: inputs[name] for name in LEVELS})
+        names = ("hold", "waits", "settled", "piece_taken")
+        assert tuple(int(getattr(dut, name).value) for name in names) == levels
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         left = {k: v for k, v in inputs.items() if k not in ("pending", "moves")}
-        model.clk(rst=rst, moved_by=moved_by, **left)
+        model.clk(rst=rst, moved_by=moved_by, streamed=streamed, piece=piece, **left)
         assert int(dut.setting_write.value) == int(model.setting is not None)
         assert int(dut.gains_changed.value) == model.gains
         assert int(dut.push.value) == model.push
         if model.setting:
-            assert self.setting() == model.setting
+            expected = model.setting
+            filter = self.setting()[2] if expected[2] is None else expected[2]
+            assert self.setting() == (*expected[:2], filter, expected[3])
         if model.shift_by is not None:
             assert dut.shift_by.value.to_signed() == model.shift_by
-        return waits
+        return levels[:2]
 
     def setting(self):
         """(axis, number, filter, value) on the pins."""
@@ -149,6 +157,40 @@ async def a_segment_is_pushed_when_its_last_word_is_written(dut):
 
 
 @cocotb.test()
+async def latency_of_a_piece_is_3_and_no_access_comes_between(dut):
+    bus = await Bus(dut).reset()
+    for part, word in enumerate((-5, 1 << 46, -(1 << 31), 1 << 24 | 7)):
+        piece = (bus.axes - 1, part, word)
+        for _ in range(2):
+            assert await bus.clk(piece=piece) == (0, 1)
+            assert not int(dut.setting_write.value)
+        await bus.clk(piece=piece)
+        assert bus.model.taken and bus.setting()[3] == word
+        await bus.clk()
+    await bus.clk()
+    assert int(dut.push.value) == 1 << bus.axes - 1
+    await bus.clk()
+    # what was begun before comes first
+    await bus.clk(piece=piece, stores=1, address=address_of("axis", "kp"), value=1)
+    while not bus.model.taken:
+        await bus.clk(piece=piece)
+    assert bus.setting()[3] == word
+
+
+@cocotb.test()
+async def a_segment_of_an_axis_that_is_streamed_is_left_out(dut):
+    bus = await Bus(dut).reset()
+    for register in ("segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks"):
+        address = address_of("axis", register) + (register.endswith(("velocity", "acceleration")))
+        for streamed in (1, 0):
+            await bus.clk(stores=1, address=address, value=1, streamed=streamed)
+            assert (await bus.clk())[0] == 1 - streamed
+            while (await bus.clk())[1]:
+                pass
+    assert await bus.write("axis", "kp", 1) is not None
+
+
+@cocotb.test()
 async def the_soft_core_waits_for_everything_that_was_requested(dut):
     bus = await Bus(dut).reset()
     assert await bus.clk() == (0, 0)
@@ -164,9 +206,13 @@ async def random_words_match_the_model(dut):
     known = [4 + 8 * kind + axis << 6 | word for kind, word in FOUND for axis in range(bus.axes)]
     layout = RegisterLayout(bus.axes)  # values are as the register memory stores them
     left = 0  # cycles for which the last setting waits
+    piece, streamed = None, 0
     for _ in range(20_000):
         stores = 0
         model = bus.model
+        if not piece and random.random() < 0.05:
+            piece = random.randrange(bus.axes), random.randrange(4), random.getrandbits(64) - 2**63
+            streamed = random.getrandbits(bus.axes)
         if not left and not (model.scaled or model.setting or model.pushes):
             stores = int(random.random() < 0.6)
         address = random.choice((random.choice(known), random.getrandbits(14)))
@@ -181,7 +227,11 @@ async def random_words_match_the_model(dut):
             moved=random.getrandbits(bus.axes) if random.random() < 0.1 else 0,
             moved_by=[random.getrandbits(48) - (1 << 47) for _ in range(bus.axes)],
             pending=int(random.random() < 0.1),
+            streamed=streamed,
+            piece=piece,
         )
+        if bus.model.taken or random.random() < 0.005:
+            piece = None
         left = random.randrange(4) if bus.model.setting else max(0, left - 1)
 
 

@@ -78,6 +78,22 @@ async def latency_is_323_and_two_for_each_tick_and_a_piece_by_hand_is_right(dut)
 
 
 @cocotb.test()
+async def a_piece_of_one_tick_has_the_velocity_that_leads_to_its_end(dut):
+    pieces = await begin(dut)
+    inputs = dict(begin=(5 << 24, 1 << 24), set_point=(8, 4 << 24), ticks=1)
+    cycles, piece = await pieces.of(**inputs, limits=(1 << 24, 0))
+    assert cycles == 3 and piece == (0, 0, 6 << 24, 1 << 24)
+    inputs["set_point"] = (9, 4 << 24)  # twice as fast
+    assert (await pieces.of(**inputs, limits=(2 << 24, 1 << 24)))[1] == (0, 0, 7 << 24, 2 << 24)
+    assert (await pieces.of(**inputs, limits=((2 << 24) - 1, 1 << 24)))[1] is None
+    assert (await pieces.of(**inputs, limits=(2 << 24, (1 << 24) - 1)))[1] is None
+    far = (FARTHEST >> 24) - 1
+    for position in (far, -far):
+        found = await pieces.of(begin=(0, 0), set_point=(position, 0), limits=FREE)
+        assert found == (3, None)
+
+
+@cocotb.test()
 async def what_breaks_a_limit_is_refused_and_what_meets_it_is_not(dut):
     pieces = await begin(dut)
     _, piece = await pieces.of(begin=(0, 0), set_point=(1000, 0), ticks=8, limits=FREE)
@@ -111,7 +127,7 @@ async def random_set_points_match_the_model(dut):
     pieces = await begin(dut)
     accepted = 0
     for _ in range(120):
-        ticks = random.choice((2, 3, 4, 40, 255, random.randrange(2, 256)))
+        ticks = random.choice((1, 2, 3, 4, 40, 255, random.randrange(1, 256)))
         at = random.randrange(-(1 << 71), 1 << 71) >> random.randrange(2, 71)
         speed = random.randrange(-TOP, TOP + 1) >> random.randrange(47)
         target = random.randrange(-TOP, TOP + 1) >> random.randrange(47)

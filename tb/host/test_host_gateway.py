@@ -210,6 +210,7 @@ def test_a_reply_that_comes_too_late_is_not_taken_for_the_next(served):
 def test_a_slow_answer_is_awaited_without_a_request_of_another_client_in_between():
     far = Rs485Bus(BusNode())
     gateway, node = Gateway(far), far.nodes[0]
+    gateway.sequences = [0] * 16  # with which no byte of a reply is the ready byte, 0x61
     assert gateway.arbiter.answer("A", 1, request_body("identify", 1))
     ready_at = far.now() + 0.125  # the node is planning; its hardware acknowledges requests
     far.from_nodes = lambda word: [word] if word == 0x61 or far.now() >= ready_at else []

@@ -10,7 +10,7 @@ import pytest
 import serial
 from serial.urlhandler import protocol_socket
 
-from moire.bus import transport
+from moire.bus import cobs, transport
 from moire.bus.protocol import ODD_ADDRESSES
 from moire.bus.transport import SerialBus
 from moire.client.bus import Bus
@@ -318,3 +318,65 @@ def test_open_bus_opens_a_simulated_machine_by_name(monkeypatch):
             assert [node.address for node in Bus(bus).find()] == [1]
     with pytest.raises(UnknownName, match="no simulated machine 's9': known are s0, s0_fine"):
         transport.open_bus("twin:s9")
+
+
+# ------------------------------------------------------------------ a served machine that is slow
+
+
+class SlowServer:
+    """A port to a server that answers a request after so long, and says its speed at once. Its
+    clock goes on while nothing comes.
+    """
+
+    def __init__(self, speed, answer_s):
+        self.speed, self.answer_s, self.clock = speed, answer_s, 0.0
+        self.due, self.asked, self.is_old = [], 0, False
+
+    def monotonic(self):
+        return self.clock
+
+    def write(self, data):
+        (content,) = cobs.PacketReader().feed(data)
+        if (said := cobs.speed_reply(content, self.speed)) is not None:
+            self.asked += 1
+            self.due += [] if self.is_old else [(self.clock, said)]
+        else:
+            self.due.append((self.clock + self.answer_s, cobs.packet(0x51, b"\1\2\3")))
+
+    def read(self, count):
+        for entry in self.due:
+            if entry[0] <= self.clock:
+                self.due.remove(entry)
+                return entry[1]
+        self.clock += 0.005
+        return b""
+
+    @property
+    def in_waiting(self):
+        return 0
+
+    def reset_input_buffer(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    "speed, answer_s, is_old, comes",
+    [
+        (0.25, 0.35, False, True),  # of 0.1 s of the machine
+        (0.25, 0.45, False, False),
+        (None, 0.35, False, False),  # no simulation: the clock holds
+        (4.0, 0.05, False, True),  # a fast one has no less time
+        (0.25, 0.35, True, False),  # a server that does not say it
+        (0.001, 9.0, False, True),  # hardly moves: at most a hundred times as long
+        (0.001, 11.0, False, False),
+    ],
+)
+def test_patience_is_that_of_a_slow_machine(monkeypatch, speed, answer_s, is_old, comes):
+    server = SlowServer(speed, answer_s)
+    server.is_old = is_old
+    monkeypatch.setattr(transport, "time", server)
+    bus = transport.CobsBus("COM7", open_port=lambda *_, **__: server)
+    bus.send([0x121, 1, 2, 0x111])
+    words = bus.receive(9, 0.1)
+    assert bool(words) == comes and server.asked == (answer_s > 0.1)
+    assert not comes or words[0] == 0x51

@@ -39,19 +39,22 @@ MODULES = {  # of a feature, which are gone without it
     "fine_stage": ("fine_stage",),
     "filters": (),  # rows of the engine's memory
     "segments": ("segment_correction", "shift_delay"),
+    "set_points": ("set_point_player", "set_point_queue", "set_point_axis", "set_point_piece"),
 }
 NEEDED_BY = {  # what goes with a feature
     "sine": ("monitor", "harmonics", "recorder"),
-    "velocity": ("drive", "filters", "bridge", "stepper", "dac", "fine_stage"),
-    "drive": ("filters", "bridge", "stepper", "dac", "fine_stage"),
+    "velocity": ("drive", "filters", "bridge", "stepper", "dac", "fine_stage", "set_points"),
+    "drive": ("filters", "bridge", "stepper", "dac", "fine_stage", "set_points"),
     "dac": ("fine_stage",),
 }
 FULL = {parameter_of(name): 1 for name in FEATURES} | {"FILTERS": 2, "SEGMENTS": 255}
 OF_ENGINE = ("waits", "result_valid", "result_kind", "result", "result_flag", "servo_overrun")
 OF_CHAIN = ("sample_overrun",)
 OF_LINES = ("line_start", "line_idle", "rate_valid", "rate", "rate_restart", "rate_steep")
+OF_PLAYER = ("stream_state", "stream_counts")
 INPUTS = (
     *OF_ENGINE,
+    *OF_PLAYER,
     *OF_LINES,
     *OF_CHAIN,
     *("select", "feedback_select", "actuator_select", "write", "word", "wdata", "tick"),
@@ -83,6 +86,7 @@ WRONG = {  # parameters of a node that cannot be built, and the rule
     "DRIVE_NEEDS_VELOCITY": dict(HAS_VELOCITY=0),
     "ACTUATORS_NEED_HAS_DRIVE": dict(HAS_DRIVE=0, HAS_STEPPER=1),
     "FILTERS_NEED_HAS_DRIVE": dict(HAS_DRIVE=0, HAS_FILTERS=1),
+    "SET_POINTS_NEED_HAS_DRIVE": dict(HAS_DRIVE=0, HAS_SET_POINTS=1),
     "AN_ACTUATOR_NEEDS_A_DRIVE": dict(HAS_BRIDGE=0, HAS_STEPPER=0, HAS_DAC=0),
     "FINE_STAGE_NEEDS_THE_DAC": dict(HAS_DAC=0, HAS_FINE_STAGE=1),
     "SEGMENTS_MUST_BE_0_OR_FROM_3_TO_255": dict(SEGMENTS=2),

@@ -366,7 +366,7 @@ uint8_t axis_reset_faults(unsigned n) {
 static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value) {
     const struct axis* a = &axes[n];
     bool on = a->state != BUS_STATE_OFF && a->state != BUS_STATE_FAULTED;
-    if (id == BUS_PARAMETER_FEED_OVERRIDE) return BUS_CAUSE_OK;
+    if (id == BUS_PARAMETER_FEED_OVERRIDE && !motion_follows(n)) return BUS_CAUSE_OK;
     if (is_busy(a)) return BUS_CAUSE_BUSY;
     switch (id) {
     case BUS_PARAMETER_DRIVE:

@@ -26,6 +26,7 @@ static struct motion {
     int64_t from, to;       // target when the plan began, and at its end
     uint8_t queued[QUEUE];  // ticks of the last pieces that were queued
     uint8_t pieces;         // number of pieces queued so far
+    bool follows;           // set_point_player plays it, and its end is not known
     bool inside;            // the error has been inside the window since inside_ms
     uint32_t inside_ms;
     uint32_t since_ms;  // start of settling
@@ -145,6 +146,7 @@ static uint8_t refusal(const struct plan* plan) {
 uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id) {
     struct plan* plan = &motions[n].plan;
     bool planned;
+    motions[n].follows = false;
     motions[n].from = axis_read_position(n, AXIS_TARGET);
     motions[n].to = motions[n].from + distance;
     if (parameters_get(n, BUS_PARAMETER_PROFILE) == STEPPED) {
@@ -205,7 +207,13 @@ bool motion_inside(unsigned n, int64_t window) {
     return error <= window && error >= -window;
 }
 
-bool motion_complete(unsigned n) { return axis_read_position(n, AXIS_TARGET) == motions[n].to; }
+void motion_follow(unsigned n) { motions[n].follows = true; }
+
+bool motion_follows(unsigned n) { return motions[n].follows; }
+
+bool motion_complete(unsigned n) {
+    return motions[n].follows || axis_read_position(n, AXIS_TARGET) == motions[n].to;
+}
 
 void motion_settle_begin(unsigned n) {
     motions[n].inside = false;

@@ -38,6 +38,10 @@ void motion_set_stream(void (*feed)(unsigned n));
 // Queues a piece of at most 255 ticks; the queue must have room. `to` is the target at the end of
 // the stream, as far as it is known.
 void motion_stream(unsigned n, const struct planner_segment* piece, bool last, int64_t to);
+// The motion that was prepared follows set-points, which set_point_player plays: its end is not
+// known.
+void motion_follow(unsigned n);
+bool motion_follows(unsigned n);     // the motion prepared last follows set-points
 uint32_t motion_room(unsigned n);    // pieces that fit into the queue of the player
 uint32_t motion_queued(unsigned n);  // ticks in it, without the piece that is being played
 uint32_t motion_busy_ticks(void);    // longest time between two calls of motion_feed

@@ -186,6 +186,14 @@ static uint8_t read_register(void) {
     return BUS_CAUSE_OK;
 }
 
+static uint8_t image_operation(uint8_t operation) {
+    uint8_t cause = BUS_CAUSE_NOT_BUILT;
+    for (unsigned part = 0; part < image_part_count && cause == BUS_CAUSE_NOT_BUILT; part++)
+        if (image_parts[part].operation) cause = image_parts[part].operation(operation);
+    return cause;
+}
+
+// A part of the image may have registers to be written, too.
 static uint8_t write_register(void) {
     uint32_t address = (uint32_t)get(&current_request[BUS_WRITE_REGISTER_REQUEST_ADDRESS], 2),
              block = address & ~0xFFu;
@@ -195,7 +203,10 @@ static uint8_t write_register(void) {
         register_write(address, value);
         return BUS_CAUSE_OK;
     }
-    if (!of_axis(block, FEEDBACK_BASE)) return BUS_CAUSE_NO_SUCH_REGISTER;
+    if (!of_axis(block, FEEDBACK_BASE)) {
+        const uint8_t cause = image_operation(BUS_OPERATION_WRITE_REGISTER);
+        return cause == BUS_CAUSE_NOT_BUILT ? BUS_CAUSE_NO_SUCH_REGISTER : cause;
+    }
     return feedback_write_register(address - block, (block - FEEDBACK_BASE) / FEEDBACK_STRIDE,
                                    value);
 }
@@ -268,13 +279,6 @@ static uint8_t drive_operation(uint8_t operation, unsigned axis) {
         return start_at_sync(current_request[BUS_START_AT_SYNC_REQUEST_AXES]);
     default: return axis_stop(axis);
     }
-}
-
-static uint8_t image_operation(uint8_t operation) {
-    uint8_t cause = BUS_CAUSE_NOT_BUILT;
-    for (unsigned part = 0; part < image_part_count && cause == BUS_CAUSE_NOT_BUILT; part++)
-        if (image_parts[part].operation) cause = image_parts[part].operation(operation);
-    return cause;
 }
 
 static uint8_t execute(uint8_t operation, uint8_t length) {

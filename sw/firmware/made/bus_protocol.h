@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xCA14FC65u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xD40D10C0u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -12,6 +12,7 @@
 #define BUS_STREAM_SHORTEST 2u    // fewest ticks from one set-point of a stream to the next
 #define BUS_STREAM_LONGEST 256u    // most ticks from one set-point of a stream to the next
 #define BUS_STREAM_LATEST 400u    // largest late_limit, in ticks
+#define BUS_WAVEFORM_LONGEST 4096u    // most values of the waveform of an excitation
 // bits b: a stream may exceed its limits by 2^-b of them, for rounding
 #define BUS_STREAM_TOLERANCE 10u
 
@@ -230,6 +231,15 @@ enum bus_scope_state {
     BUS_SCOPE_STATE_WAITING = 1,    // waiting for the trigger
     BUS_SCOPE_STATE_RECORDING = 2,    // recording
     BUS_SCOPE_STATE_FULL = 3,    // complete
+};
+
+enum bus_tick_signal {    // bits
+    BUS_TICK_SIGNAL_SINE_COSINE = 1 << 0,    // samples of sine, lower half, and cosine, upper half
+    BUS_TICK_SIGNAL_TARGET = 1 << 1,    // target, low word, 2^-16 period
+    BUS_TICK_SIGNAL_TARGET_VELOCITY = 1 << 2,    // velocity of the target, 2^-16 period per tick
+    BUS_TICK_SIGNAL_VELOCITY = 1 << 3,    // measured velocity, 2^-16 period per tick
+    BUS_TICK_SIGNAL_ERROR = 1 << 4,    // target - position, 2^-16 period
+    BUS_TICK_SIGNAL_COMMAND = 1 << 5,    // command to the drive, full scale 2^15
 };
 
 enum bus_turn_phase {
@@ -461,7 +471,8 @@ enum bus_operation {
     // signal faults of sine and cosine that are present now, and the first since reset_faults (bits
     // of signal_fault)
     BUS_OPERATION_SIGNAL = 18,
-    // one word of the register map: only index, capture and compare of the feedback channels
+    // one word of the register map: only index, capture and compare of the feedback channels, and
+    // in the image `stream` the set-points and requests of a host
     BUS_OPERATION_WRITE_REGISTER = 19,
     BUS_OPERATION_PREPARE = 20,    // plan a motion to a position, and wait for start
     // start the prepared motions of these axes (bit n: axis n) in the same tick; none starts if one
@@ -490,6 +501,19 @@ enum bus_operation {
     // five samples from this one on, 0 after the end; time between two samples in 64 cycles,
     // position: low word
     BUS_OPERATION_READ_SCOPE = 33,
+    // record signals of an axis at each servo tick, or one tick in so many: bits of a tick_signal,
+    // so many samples; while an excitation runs, the recording begins with its first value
+    BUS_OPERATION_RECORD_TICKS = 28,
+    // progress of that recording (a scope_state); once it is complete, its next words, in order
+    // from `first` on: for each sample one word of each signal
+    BUS_OPERATION_READ_TICKS = 29,
+    // values of the waveform of an excitation from this number on, full scale 2^15; nothing is
+    // stored behind value 4096 - 1
+    BUS_OPERATION_LOAD_EXCITATION = 39,
+    // add that waveform, of so many values, to the commands of an axis whose drive is on, one value
+    // at each servo tick; 0 ends it, and so does any request to the axis to move, home, stop or
+    // switch off
+    BUS_OPERATION_EXCITE = 46,
     // add an offset to the DAC of the fine stage, in open loop, and record the phase from then on,
     // one in so many samples; before the first step both loops open, the command of the motor
     // returns to 0 and the fine stage to its middle; stop, or a fault, ends it
@@ -781,6 +805,61 @@ enum bus_operation {
 #define BUS_READ_SCOPE_REPLY_ERROR_4 55u    // i32
 #define BUS_READ_SCOPE_REPLY_COMMAND_4 59u    // i16
 #define BUS_READ_SCOPE_REPLY_TIME_4 61u    // u16
+#define BUS_RECORD_TICKS_REQUEST_LENGTH 8u
+#define BUS_RECORD_TICKS_REQUEST_AXIS 2u    // u8
+#define BUS_RECORD_TICKS_REQUEST_SIGNALS 3u    // u8
+#define BUS_RECORD_TICKS_REQUEST_EVERY 4u    // u16
+#define BUS_RECORD_TICKS_REQUEST_SAMPLES 6u    // u16
+#define BUS_RECORD_TICKS_REPLY_LENGTH 3u
+#define BUS_READ_TICKS_REQUEST_LENGTH 2u
+#define BUS_READ_TICKS_REPLY_LENGTH 62u
+#define BUS_READ_TICKS_REPLY_STATE 3u    // u8
+#define BUS_READ_TICKS_REPLY_FIRST 4u    // u16
+#define BUS_READ_TICKS_REPLY_WORD_0 6u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_1 10u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_2 14u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_3 18u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_4 22u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_5 26u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_6 30u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_7 34u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_8 38u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_9 42u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_10 46u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_11 50u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_12 54u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_13 58u    // u32
+#define BUS_LOAD_EXCITATION_REQUEST_LENGTH 52u
+#define BUS_LOAD_EXCITATION_REQUEST_FIRST 2u    // u16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_0 4u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_1 6u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_2 8u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_3 10u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_4 12u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_5 14u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_6 16u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_7 18u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_8 20u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_9 22u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_10 24u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_11 26u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_12 28u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_13 30u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_14 32u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_15 34u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_16 36u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_17 38u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_18 40u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_19 42u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_20 44u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_21 46u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_22 48u    // i16
+#define BUS_LOAD_EXCITATION_REQUEST_VALUE_23 50u    // i16
+#define BUS_LOAD_EXCITATION_REPLY_LENGTH 3u
+#define BUS_EXCITE_REQUEST_LENGTH 5u
+#define BUS_EXCITE_REQUEST_AXIS 2u    // u8
+#define BUS_EXCITE_REQUEST_PERIOD 3u    // u16
+#define BUS_EXCITE_REPLY_LENGTH 3u
 #define BUS_STEP_FINE_REQUEST_LENGTH 7u
 #define BUS_STEP_FINE_REQUEST_AXIS 2u    // u8
 #define BUS_STEP_FINE_REQUEST_OFFSET 3u    // i16
@@ -975,6 +1054,10 @@ enum bus_operation {
     X(arm_scope, 31, 13, 3, 1) \
     X(scope, 32, 2, 6, 0) \
     X(read_scope, 33, 3, 63, 0) \
+    X(record_ticks, 28, 8, 3, 1) \
+    X(read_ticks, 29, 2, 62, 0) \
+    X(load_excitation, 39, 52, 3, 0) \
+    X(excite, 46, 5, 3, 1) \
     X(step_fine, 37, 7, 3, 1) \
     X(read_fine, 38, 3, 63, 1) \
     X(begin_stream, 25, 5, 3, 1) \

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x29d1b31cu  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xc94cc514u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -141,6 +141,10 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_BUILD_MEMORY_MASK 0x0000ff00u
 #define NODE_BUILD_MEMORY_SHIFT 8
 #define NODE_BUILD_MEMORY_WIDTH 8
+// SCOPE_WORDS: words of the recorder of ticks; 0: there is none, and no excitation
+#define NODE_BUILD_SCOPE_MASK 0x01ff0000u
+#define NODE_BUILD_SCOPE_SHIFT 16
+#define NODE_BUILD_SCOPE_WIDTH 9
 // r: cycles since reset; every time stamp is a part of it [cycle]
 #define NODE_TIME_STAMP 0x010u
 #define NODE_TIME_STAMP_LOW 0x010u
@@ -173,6 +177,115 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_WAIT_TIME_MASK 0x00ffffffu
 #define NODE_WAIT_TIME_SHIFT 0
 #define NODE_WAIT_TIME_WIDTH 24
+// rw: what the recorder of ticks records
+#define NODE_SCOPE 0x030u
+// number of the axis
+#define NODE_SCOPE_AXIS_MASK 0x00000007u
+#define NODE_SCOPE_AXIS_SHIFT 0
+#define NODE_SCOPE_AXIS_WIDTH 3
+// bit n: 0 sine and cosine, 1 target, 2 target velocity, 3 velocity, 4 error, 5 command
+#define NODE_SCOPE_SIGNALS_MASK 0x000001f8u
+#define NODE_SCOPE_SIGNALS_SHIFT 3
+#define NODE_SCOPE_SIGNALS_WIDTH 6
+// rw: samples of a recording
+#define NODE_SCOPE_SAMPLES 0x034u
+// samples
+#define NODE_SCOPE_SAMPLES_LENGTH_MASK 0x0000ffffu
+#define NODE_SCOPE_SAMPLES_LENGTH_SHIFT 0
+#define NODE_SCOPE_SAMPLES_LENGTH_WIDTH 16
+// from sample to sample; 0 acts as 1 [tick]
+#define NODE_SCOPE_SAMPLES_EVERY_MASK 0xffff0000u
+#define NODE_SCOPE_SAMPLES_EVERY_SHIFT 16
+#define NODE_SCOPE_SAMPLES_EVERY_WIDTH 16
+// rw: state of the recording
+#define NODE_SCOPE_STATE 0x038u
+// begins a recording, at the first value of a waveform that runs
+#define NODE_SCOPE_STATE_START_MASK 0x00000001u
+#define NODE_SCOPE_STATE_START_SHIFT 0
+#define NODE_SCOPE_STATE_START_WIDTH 1
+// it is not complete
+#define NODE_SCOPE_STATE_RECORDING_MASK 0x00000002u
+#define NODE_SCOPE_STATE_RECORDING_SHIFT 1
+#define NODE_SCOPE_STATE_RECORDING_WIDTH 1
+// it is complete
+#define NODE_SCOPE_STATE_FULL_MASK 0x00000004u
+#define NODE_SCOPE_STATE_FULL_SHIFT 2
+#define NODE_SCOPE_STATE_FULL_WIDTH 1
+// r: word of the recording; reading advances to the next one
+#define NODE_SCOPE_WORD 0x03cu
+#define NODE_SCOPE_WORD_MASK 0xffffffffu
+#define NODE_SCOPE_WORD_SHIFT 0
+#define NODE_SCOPE_WORD_WIDTH 32
+// rw: tick_count at which the axes are to be at the set-points that are committed next [tick]
+#define NODE_SET_POINT_TICK 0x040u
+#define NODE_SET_POINT_TICK_MASK 0xffffffffu
+#define NODE_SET_POINT_TICK_SHIFT 0
+#define NODE_SET_POINT_TICK_WIDTH 32
+// rw: axes whose set-points are committed, bit n: axis n; writing queues those of all these axes at
+// once, for set_point_tick
+#define NODE_SET_POINT_COMMIT 0x044u
+#define NODE_SET_POINT_COMMIT_MASK 0x000000ffu
+#define NODE_SET_POINT_COMMIT_SHIFT 0
+#define NODE_SET_POINT_COMMIT_WIDTH 8
+// r: servo ticks since reset; wraps [tick]
+#define NODE_TICK_COUNT 0x048u
+#define NODE_TICK_COUNT_MASK 0xffffffffu
+#define NODE_TICK_COUNT_SHIFT 0
+#define NODE_TICK_COUNT_WIDTH 32
+// rw: longest extrapolation of a stream whose next set-point is late [tick]
+#define NODE_LATE_LIMIT 0x04cu
+#define NODE_LATE_LIMIT_MASK 0x0000ffffu
+#define NODE_LATE_LIMIT_SHIFT 0
+#define NODE_LATE_LIMIT_WIDTH 16
+// rw: requests of a host that reaches the registers; the firmware serves them, bit n of each field:
+// axis n
+#define NODE_AXIS_REQUESTS 0x050u
+// 1: the drive is to be on
+#define NODE_AXIS_REQUESTS_ENABLE_MASK 0x000000ffu
+#define NODE_AXIS_REQUESTS_ENABLE_SHIFT 0
+#define NODE_AXIS_REQUESTS_ENABLE_WIDTH 8
+// rising: home
+#define NODE_AXIS_REQUESTS_HOME_MASK 0x0000ff00u
+#define NODE_AXIS_REQUESTS_HOME_SHIFT 8
+#define NODE_AXIS_REQUESTS_HOME_WIDTH 8
+// 1: the axis is to follow set-points; falling ends its stream
+#define NODE_AXIS_REQUESTS_STREAM_MASK 0x00ff0000u
+#define NODE_AXIS_REQUESTS_STREAM_SHIFT 16
+#define NODE_AXIS_REQUESTS_STREAM_WIDTH 8
+// rising: reset the faults
+#define NODE_AXIS_REQUESTS_RESET_FAULTS_MASK 0xff000000u
+#define NODE_AXIS_REQUESTS_RESET_FAULTS_SHIFT 24
+#define NODE_AXIS_REQUESTS_RESET_FAULTS_WIDTH 8
+// rw: axes that follow set-points, bit n: axis n; the firmware sets a bit after its checks, and a
+// stream that has ended needs it to fall
+#define NODE_STREAM_AXES 0x054u
+#define NODE_STREAM_AXES_MASK 0x000000ffu
+#define NODE_STREAM_AXES_SHIFT 0
+#define NODE_STREAM_AXES_WIDTH 8
+// rw: waveform that is added to the commands of an axis
+#define NODE_EXCITATION 0x060u
+// number of the axis
+#define NODE_EXCITATION_AXIS_MASK 0x00000007u
+#define NODE_EXCITATION_AXIS_SHIFT 0
+#define NODE_EXCITATION_AXIS_WIDTH 3
+// values of the waveform, one for each tick, 4096 at most; 0: nothing is added [tick]
+#define NODE_EXCITATION_PERIOD_MASK 0x0000fff8u
+#define NODE_EXCITATION_PERIOD_SHIFT 3
+#define NODE_EXCITATION_PERIOD_WIDTH 13
+// largest |command| with it, full scale 2^15
+#define NODE_EXCITATION_LIMIT_MASK 0x7fff0000u
+#define NODE_EXCITATION_LIMIT_SHIFT 16
+#define NODE_EXCITATION_LIMIT_WIDTH 15
+// w: value of the waveform; writing stores it
+#define NODE_EXCITATION_VALUE 0x064u
+// full scale 2^15
+#define NODE_EXCITATION_VALUE_MASK 0x0000ffffu
+#define NODE_EXCITATION_VALUE_SHIFT 0
+#define NODE_EXCITATION_VALUE_WIDTH 16
+// its number
+#define NODE_EXCITATION_VALUE_AT_MASK 0x0fff0000u
+#define NODE_EXCITATION_VALUE_AT_SHIFT 16
+#define NODE_EXCITATION_VALUE_AT_WIDTH 12
 
 // RS-485 bus: 9-bit UART, address filter, frame check, watchdog
 // rw: duration of one bit [1/16 cycle]
@@ -796,6 +909,24 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_FOLLOWING_LIMIT_MASK 0xffffffffu
 #define AXIS_FOLLOWING_LIMIT_SHIFT 0
 #define AXIS_FOLLOWING_LIMIT_WIDTH 32
+// rw: the axis as the firmware has it, for a host that reaches the registers
+#define AXIS_SUPERVISION 0x024u
+// state of the axis, as in the reply of status
+#define AXIS_SUPERVISION_STATE_MASK 0x0000000fu
+#define AXIS_SUPERVISION_STATE_SHIFT 0
+#define AXIS_SUPERVISION_STATE_WIDTH 4
+// 1: homed
+#define AXIS_SUPERVISION_HOMED_MASK 0x00000010u
+#define AXIS_SUPERVISION_HOMED_SHIFT 4
+#define AXIS_SUPERVISION_HOMED_WIDTH 1
+// how the last motion has ended, a cause of the bus
+#define AXIS_SUPERVISION_ENDED_MASK 0x0000ff00u
+#define AXIS_SUPERVISION_ENDED_SHIFT 8
+#define AXIS_SUPERVISION_ENDED_WIDTH 8
+// why the last request of axis_requests was refused, a cause of the bus; 0: it was not
+#define AXIS_SUPERVISION_REFUSAL_MASK 0x00ff0000u
+#define AXIS_SUPERVISION_REFUSAL_SHIFT 16
+#define AXIS_SUPERVISION_REFUSAL_WIDTH 8
 // r: position [1/65536 period]
 #define AXIS_POSITION 0x028u
 #define AXIS_POSITION_LOW 0x028u
@@ -982,11 +1113,56 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_BUILT_SEGMENTS_MASK 0x00ff0000u
 #define AXIS_BUILT_SEGMENTS_SHIFT 16
 #define AXIS_BUILT_SEGMENTS_WIDTH 8
+// HAS_SET_POINTS: player of streamed set-points
+#define AXIS_BUILT_SET_POINTS_MASK 0x01000000u
+#define AXIS_BUILT_SET_POINTS_SHIFT 24
+#define AXIS_BUILT_SET_POINTS_WIDTH 1
 // rw: largest |integral term|; full scale 2^15
 #define AXIS_INTEGRAL_LIMIT 0x070u
 #define AXIS_INTEGRAL_LIMIT_MASK 0x00007fffu
 #define AXIS_INTEGRAL_LIMIT_SHIFT 0
 #define AXIS_INTEGRAL_LIMIT_WIDTH 15
+// rw: largest |velocity| of a stream [2^-24 period/tick]
+#define AXIS_STREAM_VELOCITY_LIMIT 0x074u
+#define AXIS_STREAM_VELOCITY_LIMIT_MASK 0x7fffffffu
+#define AXIS_STREAM_VELOCITY_LIMIT_SHIFT 0
+#define AXIS_STREAM_VELOCITY_LIMIT_WIDTH 31
+// r: state of the stream
+#define AXIS_STREAM_STATE 0x078u
+// 0 off, 1 prepared, without a set-point yet, 2 streaming, 3 extrapolating, 4 ended
+#define AXIS_STREAM_STATE_MODE_MASK 0x00000007u
+#define AXIS_STREAM_STATE_MODE_SHIFT 0
+#define AXIS_STREAM_STATE_MODE_WIDTH 3
+// how the last stream ended: 0 not, 1 released at rest, 2 stopped, 3 set-point late, 4 fault
+#define AXIS_STREAM_STATE_ENDED_MASK 0x00000038u
+#define AXIS_STREAM_STATE_ENDED_SHIFT 3
+#define AXIS_STREAM_STATE_ENDED_WIDTH 3
+// why the last set-point was refused: 0 none was, 1 late, 2 limits, 3 out of travel, 4 queue full,
+// 5 incomplete, 6 not streamed, 7 more than 255 ticks ahead
+#define AXIS_STREAM_STATE_REFUSAL_MASK 0x000001c0u
+#define AXIS_STREAM_STATE_REFUSAL_SHIFT 6
+#define AXIS_STREAM_STATE_REFUSAL_WIDTH 3
+// set-points that can be committed
+#define AXIS_STREAM_STATE_ROOM_MASK 0x00003e00u
+#define AXIS_STREAM_STATE_ROOM_SHIFT 9
+#define AXIS_STREAM_STATE_ROOM_WIDTH 5
+// ticks extrapolated since the stream began; wraps [tick]
+#define AXIS_STREAM_STATE_EXTRAPOLATED_MASK 0xffff0000u
+#define AXIS_STREAM_STATE_EXTRAPOLATED_SHIFT 16
+#define AXIS_STREAM_STATE_EXTRAPOLATED_WIDTH 16
+// r: set-points since the stream began; the counts wrap
+#define AXIS_STREAM_COUNTS 0x07cu
+#define AXIS_STREAM_COUNTS_ACCEPTED_MASK 0x0000ffffu
+#define AXIS_STREAM_COUNTS_ACCEPTED_SHIFT 0
+#define AXIS_STREAM_COUNTS_ACCEPTED_WIDTH 16
+// late ones
+#define AXIS_STREAM_COUNTS_LATE_MASK 0x00ff0000u
+#define AXIS_STREAM_COUNTS_LATE_SHIFT 16
+#define AXIS_STREAM_COUNTS_LATE_WIDTH 8
+// those refused for another cause
+#define AXIS_STREAM_COUNTS_REFUSED_MASK 0xff000000u
+#define AXIS_STREAM_COUNTS_REFUSED_SHIFT 24
+#define AXIS_STREAM_COUNTS_REFUSED_WIDTH 8
 // rw: proportional gain on the error [1/65536 command/(period/65536)]
 #define AXIS_KP 0x080u
 #define AXIS_KP_MASK 0x00ffffffu
@@ -1103,6 +1279,31 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_START_AT_MASK 0xffffffffu
 #define AXIS_START_AT_SHIFT 0
 #define AXIS_START_AT_WIDTH 32
+// rw: position of the next set-point [1/65536 period]
+#define AXIS_SET_POINT_POSITION 0x0e0u
+#define AXIS_SET_POINT_POSITION_LOW 0x0e0u
+#define AXIS_SET_POINT_POSITION_HIGH 0x0e4u
+#define AXIS_SET_POINT_POSITION_WIDTH 48
+// rw: lowest position of a stream [1/65536 period]
+#define AXIS_STREAM_TRAVEL_LOW 0x0e8u
+#define AXIS_STREAM_TRAVEL_LOW_LOW 0x0e8u
+#define AXIS_STREAM_TRAVEL_LOW_HIGH 0x0ecu
+#define AXIS_STREAM_TRAVEL_LOW_WIDTH 48
+// rw: highest position of a stream [1/65536 period]
+#define AXIS_STREAM_TRAVEL_HIGH 0x0f0u
+#define AXIS_STREAM_TRAVEL_HIGH_LOW 0x0f0u
+#define AXIS_STREAM_TRAVEL_HIGH_HIGH 0x0f4u
+#define AXIS_STREAM_TRAVEL_HIGH_WIDTH 48
+// rw: velocity of the next set-point [2^-24 period/tick]
+#define AXIS_SET_POINT_VELOCITY 0x0f8u
+#define AXIS_SET_POINT_VELOCITY_MASK 0xffffffffu
+#define AXIS_SET_POINT_VELOCITY_SHIFT 0
+#define AXIS_SET_POINT_VELOCITY_WIDTH 32
+// rw: largest |acceleration| of a stream [2^-32 period/tick2]
+#define AXIS_STREAM_ACCELERATION_LIMIT 0x0fcu
+#define AXIS_STREAM_ACCELERATION_LIMIT_MASK 0xffffffffu
+#define AXIS_STREAM_ACCELERATION_LIMIT_SHIFT 0
+#define AXIS_STREAM_ACCELERATION_LIMIT_WIDTH 32
 
 // feedback channel: edge filter, index, signal correction, calibration, signal faults, capture,
 // compare

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from moire.analysis import report
 from moire.analysis.fine_steps import Steps
+from moire.analysis.least_squares import least_squares
 from moire.analysis.tune import MOVED, NotTuned, Unsuitable, tick_delay
 from moire.made.bus_tables import PARAMETERS
 
@@ -289,24 +290,7 @@ def fit(time_s: Array, rise: Array, guess: Values) -> tuple[Values, float]:
     def beyond(logs: Array) -> Array:
         return left(time_s, rise, values(logs))[0]
 
-    logs, damper = numpy.log(numpy.asarray(guess, float)), 1e-2
-    found = beyond(logs)
-    for _ in range(60):
-        slope = numpy.column_stack(
-            [(beyond(logs + 1e-5 * unit) - found) / 1e-5 for unit in numpy.eye(3)]
-        )
-        normal = slope.T @ slope
-        wall = damper * numpy.diag(numpy.diag(normal) + 1e-30)
-        change = numpy.clip(numpy.linalg.solve(normal + wall, -slope.T @ found), -0.5, 0.5)
-        tried = beyond(logs + change)
-        if tried @ tried < found @ found:
-            logs, found, damper = logs + change, tried, damper / 5
-            if numpy.abs(change).max() < 1e-6:
-                break
-        else:
-            damper *= 5
-            if damper > 1e9:
-                break
+    logs, found = least_squares(beyond, numpy.log(numpy.asarray(guess, float)))
     return values(logs), float(found @ found)
 
 

@@ -8,8 +8,9 @@
     Path("tuning.png").write_bytes(tune.picture(plant, tuning))
 
 Commands have the full scale 2^15, and positions are in LSB of 2^-16 period. The plant is a velocity
-that follows the command with a gain, one time constant and a delay:
-v[n+1] = a v[n] + b u[n - delay].
+that follows the command with a gain, one time constant and a delay, and a mode of the mechanics
+between the motor and the scale, if it has one:
+v[n+1] = a v[n] + b ((1 - part) u[n - delay] + part u[n - delay - 1]).
 """
 
 import math
@@ -83,6 +84,10 @@ class Plant:
     tick_s: float
     unexplained: float = 0.0  # share of the rms of the velocity that the model does not explain
     resonance_hz: float | None = None
+    part: float = 0.0  # ticks beyond `delay`, 0 to 1
+    damping: float | None = (
+        None  # of critical, of a mode at resonance_hz; None: no mode is modelled
+    )
 
     @property
     def gain(self) -> float:
@@ -94,10 +99,23 @@ class Plant:
         """The time constant in s."""
         return -self.tick_s / math.log(self.a) if self.a > 0 else 0.0
 
+    @property
+    def mode(self) -> tuple[float, float]:
+        """c1 and c2 of the mode, out[n] = (1 - c1 - c2) in[n] + c1 out[n-1] + c2 out[n-2]."""
+        if self.damping is None or self.resonance_hz is None:
+            return 0.0, 0.0
+        angle = 2 * math.pi * self.resonance_hz * self.tick_s
+        radius = math.exp(-self.damping * angle)
+        turn = angle * math.sqrt(max(0.0, 1 - self.damping**2))
+        return 2 * radius * math.cos(turn), -(radius**2)
+
     def response(self, hz: ArrayLike) -> Complex:
         """Position over command at these frequencies."""
         back = tick_delay(hz, self.tick_s)
-        response: Complex = self.b * back ** (self.delay + 1) / (1 - self.a * back) / (1 - back)
+        c1, c2 = self.mode
+        late = (1 - self.part + self.part * back) * back ** (self.delay + 1)
+        shaped = (1 - c1 - c2) / (1 - c1 * back - c2 * back**2)
+        response: Complex = self.b * late * shaped / (1 - self.a * back) / (1 - back)
         return response
 
 
@@ -557,12 +575,13 @@ def step(
     ticks = ticks or max(60, round(6 / (tuning.bandwidth_hz or 0.01 / plant.tick_s) / plant.tick_s))
     kp, ki, kd = (tuning.real(name) for name in ("kp", "ki", "kd"))
     queue, states = [0.0] * plant.delay, [[0.0] * 4 for _ in tuning.filters]
-    position = velocity = total = 0.0
+    position = velocity = total = before = measured = 0.0
+    (c1, c2), shaped = plant.mode, [0.0, 0.0]
     out = []
     for _ in range(ticks):
         out.append(position)
         error = size - position
-        unlimited = kp * error + total + ki * error - kd * velocity
+        unlimited = kp * error + total + ki * error - kd * measured
         if abs(unlimited) < limit:
             total += ki * error
         command = max(-limit, min(limit, unlimited))
@@ -571,8 +590,12 @@ def step(
             command = sum(value / COEFFICIENT * x for value, x in zip(values, inputs))
             state[:] = inputs[0], state[0], command, state[2]
         queue.append(max(-limit, min(limit, command)))
-        velocity = plant.a * velocity + plant.b * queue.pop(0)
-        position += velocity
+        given = queue.pop(0)
+        velocity = plant.a * velocity + plant.b * ((1 - plant.part) * given + plant.part * before)
+        before = given
+        measured = (1 - c1 - c2) * velocity + c1 * shaped[0] + c2 * shaped[1]
+        shaped = [measured, shaped[0]]
+        position += measured
     return numpy.full(ticks, size), numpy.array(out)
 
 

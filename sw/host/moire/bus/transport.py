@@ -21,7 +21,6 @@ from typing import Any, Self, TypeVar
 
 from moire.bus.cobs import (
     FROM_SERVER,
-    LONGEST_PACKET,
     LONGEST_STUFFED,
     PacketReader,
     sealed,
@@ -329,9 +328,11 @@ class CobsBus(PortBus):
     """A stream of plain bytes with COBS packets.
 
     What is sent between two command bytes becomes one packet, and received packets are unpacked.
+    Where the server says that its simulated machine runs slowly, a reply has so much more time.
     """
 
     handshake = False
+    SLOWEST = 0.01  # simulated seconds per second for which a reply is waited for
 
     def __init__(self, port: str, baud: int = BAUD, open_port: OpenPort | None = None):
         super().__init__(port, baud, open_port)
@@ -339,6 +340,8 @@ class CobsBus(PortBus):
         self.arrived: list[int] = []
         self.request = bytearray()
         self.awaited: int | None = None  # first byte of the reply that is awaited
+        self.said: float | None = None  # the speed that the server has said last
+        self.has_said = False
         self.checked(self.port.reset_input_buffer)
 
     def send(self, words: Sequence[int]) -> None:
@@ -352,21 +355,35 @@ class CobsBus(PortBus):
                 self.write(sealed(bytes(self.request)))
 
     def receive(self, count: int, timeout_s: float) -> list[int]:
-        end = time.monotonic() + timeout_s + self.network_s
-        while len(self.arrived) < count and self.awaited is not None:
-            data = self.read(LONGEST_STUFFED, end)
-            if not data:
-                break
-            for content in self.packets.feed(data):
-                if content[0] == self.awaited:
-                    self.arrived, self.awaited = list(content), None
+        began = time.monotonic()
+
+        def complete() -> bool:
+            return len(self.arrived) >= count or self.awaited is None
+
+        if not self.take(began + timeout_s + self.network_s, complete):
+            share = min(1.0, max(self.speed() or 1.0, self.SLOWEST))
+            self.take(began + timeout_s / share + self.network_s, complete)
         words, self.arrived = self.arrived[:count], self.arrived[count:]
         return words
 
+    def take(self, end: float, complete: Callable[[], bool]) -> bool:
+        """Takes packets until this is complete; false if it is not until the moment `end`."""
+        while not complete():
+            data = self.read(LONGEST_STUFFED, end)
+            if not data:
+                return False
+            for content in self.packets.feed(data):
+                if content[0] == FROM_SERVER:
+                    self.said, self.has_said = speed_in(content), True
+                elif content[0] == self.awaited:
+                    self.arrived, self.awaited = list(content), None
+        return True
+
     def speed(self) -> float | None:
-        self.arrived, self.awaited = [], FROM_SERVER
+        self.said, self.has_said = None, False
         self.write(speed_request(0))
-        return speed_in(bytes(self.receive(LONGEST_PACKET, SERVER_S)))
+        self.take(time.monotonic() + SERVER_S + self.network_s, lambda: self.has_said)
+        return self.said
 
 
 def port_errors(*more: type[Exception]) -> tuple[type[Exception], ...]:

@@ -19,6 +19,13 @@ MACHINES = {  # made by experiments.machines
     "s3": "linear motor with a scale and its reference mark",
     "s4": "indexing table and wire-EDM machine, node 1 with the panel, node 2 with the table",
 }
+AXES = {  # names of their axes: address of the node, and number of the axis
+    "s0": {"x": (1, 0), "y": (2, 0)},
+    "s0_fine": {"x": (1, 0)},
+    "s2": {"x": (1, 0), "y": (1, 1), "z": (1, 2)},
+    "s3": {"x": (1, 0)},
+    "s4": {"table": (2, 0)},
+}
 
 
 def machine_of(port: str) -> str | None:

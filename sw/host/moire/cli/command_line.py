@@ -14,6 +14,7 @@ from moire.cli.options import Options
 from moire.cli.parser import moire, parse_call, parse_line
 from moire.cli.session import Interrupted, OpenTransport, Session
 from moire.cli.signals import Ended, ending_by_signals
+from moire.description import Description, describe
 from moire.errors import MoireError
 
 __all__ = ["main", "moire", "parse_call", "parse_line"]
@@ -37,7 +38,8 @@ def carry_out(session: Session, arguments: list[str]) -> int:
     """Carry out the commands and close the session. Returns the exit code."""
     try:
         try:
-            for planned in parse_call(arguments):
+            session.description = described(arguments)
+            for planned in parse_call(arguments, session.description):
                 session.carry_out(planned)
             return 0
         except OutputError:
@@ -62,6 +64,21 @@ def carry_out(session: Session, arguments: list[str]) -> int:
         return 0
     finally:
         session.close()
+
+
+def described(arguments: list[str]) -> Description:
+    """The description of the machine for this call, which the parser needs to know names."""
+    return describe(value_of(arguments, "--machine-file")).of(value_of(arguments, "--port"))
+
+
+def value_of(arguments: list[str], option: str) -> str | None:
+    """The value of an option, before the parser has read it; None without it."""
+    for at, word in enumerate(arguments):
+        if word == option:
+            return next(iter(arguments[at + 1 :]), None)
+        if word.startswith(f"{option}="):
+            return word.partition("=")[2]
+    return None
 
 
 def close_output(out: TextIO) -> None:

@@ -16,6 +16,7 @@ import click
 from moire.bus.transport import Transport
 from moire.cli.session import Call
 from moire.cli.values import FILE, TEXT, WHOLE
+from moire.description import Description
 from moire.errors import PortError
 
 if TYPE_CHECKING:
@@ -117,6 +118,7 @@ def serve_doors(
     words: str,
     values: dict[str, Any],
     duration: Fraction | None,
+    description: Description,
 ) -> None:
     """Serves a transport, which it closes in the end, until Ctrl-C or for a duration in seconds.
 
@@ -126,7 +128,7 @@ def serve_doors(
 
     gateway, bind, web = Gateway(transport), doors.bind_packets, None
     try:
-        web = web_door(gateway, doors)
+        web = web_door(gateway, doors, description)
         by_rfc2217 = f"rfc2217://{bind}:{gateway.open_rfc2217(bind, doors.rfc2217)}"
         by_tcp = f"socket://{bind}:{gateway.open_tcp(bind, doors.tcp)}"
         terminal = gateway.open_pty()
@@ -157,7 +159,7 @@ def serve_doors(
             web.close()
 
 
-def web_door(gateway: "Gateway", doors: Doors) -> "WebDoor":
+def web_door(gateway: "Gateway", doors: Doors, description: Description) -> "WebDoor":
     """The door of HTTP and WebSocket. Its packages are loaded only here: they take a while."""
     try:
         from moire.web.door import Settings, WebDoor
@@ -167,8 +169,16 @@ def web_door(gateway: "Gateway", doors: Doors) -> "WebDoor":
     def path(name: str | None) -> Path | None:
         return None if name is None else Path(name)
 
-    files = map(path, (doors.token, doors.read_token, doors.certificate, doors.key))
-    return WebDoor(gateway, Settings(doors.bind, doors.http, *files))
+    settings = Settings(
+        doors.bind,
+        doors.http,
+        path(doors.token),
+        path(doors.read_token),
+        path(doors.certificate),
+        path(doors.key),
+        description,
+    )
+    return WebDoor(gateway, settings)
 
 
 @contextmanager

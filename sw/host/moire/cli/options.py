@@ -20,9 +20,9 @@ from moire.cli.values import (
     WAITING_TIME,
     Name,
 )
-from moire.client.bus import ANSWER_S
+from moire.client.bus import ANSWER_S, TRIES
 
-OF_THE_PORT = ("port", "baud", "parity", "patience", "record")
+OF_THE_PORT = ("port", "machine_file", "baud", "parity", "patience", "tries", "record")
 OF_THE_CALL = (*OF_THE_PORT, "json")
 GIVEN = "moire.given"  # key in the meta data of a context
 
@@ -32,9 +32,11 @@ class Options:
     """The values of the options of every command; the defaults hold where the user gives none."""
 
     port: str | None = None
+    machine_file: str | None = None
     baud: int = BAUD
     parity: str = "auto"
     patience: Fraction | float = ANSWER_S  # s
+    tries: int = TRIES
     record: str | None = None
     address: int = 1
     axis: int = 0
@@ -61,7 +63,15 @@ COMMON = (
         type=TEXT,
         help="The serial port (/dev/ttyUSB0, COM3, rfc2217://host:port, socket://host:port). "
         "'twin' is the simulated stage and 'twin:s2' another simulated machine. Without this "
-        "option the environment variable MOIRE_PORT names the port.",
+        "option it is the port of the variable MOIRE_PORT, or of machine.toml.",
+    ),
+    Common(
+        "--machine-file",
+        metavar="FILE",
+        type=FILE,
+        help="The description of the machine: its port, and the names of its axes, which stand "
+        "after the command (moire move x 1.5mm) or behind --axis. The default is the variable "
+        "MOIRE_MACHINE_FILE, or machine.toml in this folder or in ~/.config/moire.",
     ),
     Common(
         "--baud",
@@ -79,10 +89,18 @@ COMMON = (
     ),
     Common(
         "--patience",
+        "--timeout",
         metavar="TIME",
         type=DURATION,
-        help="How long to wait for an answer of a node before the request is repeated. The default "
-        f"is {1000 * ANSWER_S:g}ms. A simulated machine on a busy computer may need 2s.",
+        help="How long to wait for an answer of a node before the request is repeated, in the time "
+        f"of the machine: longer where a simulated one runs slowly. The default is "
+        f"{1000 * ANSWER_S:g}ms.",
+    ),
+    Common(
+        "--tries",
+        metavar="N",
+        type=POSITIVE,
+        help=f"How often a request is sent before nobody answers. The default is {TRIES}.",
     ),
     Common(
         "--record",

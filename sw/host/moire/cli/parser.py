@@ -16,12 +16,16 @@ from moire.cli.commands import MODULES, SECTIONS
 from moire.cli.files import OutputError
 from moire.cli.options import COMMON, GIVEN, OF_THE_CALL, OF_THE_PORT, Common, Options
 from moire.cli.values import did_you_mean, marked, near_names
+from moire.description import Description
 from moire.errors import MoireError
 
 EXAMPLES = """\
 Several commands in one call have -- between them:
   moire --port twin home -- move 1mm -- status
   moire --port /dev/ttyUSB0 reset -- home -- move 200um -- move -50nm --by
+
+With a machine.toml, axes have names; so have those of a simulated machine:
+  moire --port twin:s2 home x -- move x 1mm -- status y
 
 Lengths are written with pm nm um mm cm m (1.5mm, 200um, 50nm), speeds as 5mm/s, times as 20ms.
 
@@ -40,6 +44,7 @@ different sources; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP: a moving axis was stoppe
 Completion of commands, options and names by the Tab key, for bash (or zsh, fish):
   eval "$(_MOIRE_COMPLETE=bash_source moire)"
 """
+NO_NAMES = Description()
 STANDS_ALONE = ("run", "serve", "shell", "twin", "study")
 
 
@@ -237,9 +242,36 @@ def split(arguments: list[str]) -> list[list[str]]:
     return parts
 
 
-def parse_part(part: list[str]) -> Planned:
+def with_places(part: list[str], description: Description) -> list[str]:
+    """One command, in which the name of an axis has become the options --address and --axis. It
+    stands behind --axis, or after the command and its action; 'start' takes several.
+    """
+    axes, after = description.axes, 0
+    if not axes:
+        return part
+    for at, word in enumerate(part):
+        if word in MODULES and word not in STANDS_ALONE:
+            command = moire.get_command(click.Context(moire), word)
+            after = at + 1 + isinstance(command, Group)
+            break
+    out: list[str] = []
+    for at, word in enumerate(part):
+        known = axes.get(word)
+        if known and out and out[-1] == "--axis":
+            out[-1:] = ["--address", str(known.node), "--axis", str(known.axis)]
+        elif known and after and part[after - 1] == "start" and at >= after:
+            out.append(f"{known.node}.{known.axis}")
+        elif known and after and at == after:
+            out += ["--address", str(known.node), "--axis", str(known.axis)]
+        else:
+            out.append(word)
+    return out
+
+
+def parse_part(part: list[str], description: Description) -> Planned:
     """One command. SystemExit after --help or --version, which click has printed."""
     try:
+        part = with_places(part, description)
         planned = moire.main(part, prog_name="moire", standalone_mode=False)
     except OSError as error:  # of --help
         raise OutputError(error) from None
@@ -283,11 +315,11 @@ def name_of(parameter: click.Parameter) -> str:
     return parameter.metavar or parameter.human_readable_name
 
 
-def parse(arguments: list[str], before: Options) -> list[Planned]:
+def parse(arguments: list[str], before: Options, description: Description) -> list[Planned]:
     """The commands of a chain. The options of the first command hold for all; the options of the
     port and --json hold for the whole chain wherever they are given.
     """
-    planned = [parse_part(part) for part in split(arguments)]
+    planned = [parse_part(part, description) for part in split(arguments)]
     first = replace(before, **planned[0].given)
     each = [replace(first, **one.given) for one in planned]
     of_all = {
@@ -299,16 +331,16 @@ def parse(arguments: list[str], before: Options) -> list[Planned]:
     return [replace(one, options=replace(options, **of_all)) for one, options in zip(planned, each)]
 
 
-def parse_call(arguments: list[str]) -> list[Planned]:
+def parse_call(arguments: list[str], description: Description = NO_NAMES) -> list[Planned]:
     """The commands of a whole call of `moire`."""
-    planned = parse(arguments, Options())
+    planned = parse(arguments, Options(port=description.port), description)
     for one in planned:
         if len(planned) > 1 and one.name in STANDS_ALONE:
             raise UsageError(f"'{one.name}' must be the only command of its call", one.name)
     return planned
 
 
-def parse_line(text: str, options: Options) -> list[Planned]:
+def parse_line(text: str, options: Options, description: Description = NO_NAMES) -> list[Planned]:
     """The commands of one line of a file or of the shell, which have the options of the call."""
     try:
         arguments = shlex.split(text, comments=True)
@@ -316,13 +348,14 @@ def parse_line(text: str, options: Options) -> list[Planned]:
         raise UsageError(f"'{text.strip()}' cannot be read: {error}") from None
     if not arguments:
         return []
-    planned = parse(arguments, options)
+    planned = parse(arguments, options, description)
     for one in planned:
         if one.name in STANDS_ALONE:
             raise UsageError(f"'{one.name}' is not allowed in a file or a shell", one.name)
         for name in OF_THE_PORT:
             if getattr(one.options, name) != getattr(options, name):
+                option = name.replace("_", "-")
                 raise UsageError(
-                    f"--{name} holds for the whole call: give it to 'moire' itself", one.name
+                    f"--{option} holds for the whole call: give it to 'moire' itself", one.name
                 )
     return planned

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Opens the port that the options name, and records what goes over it."""
 
-import os
-
 from moire.bus import recording
 from moire.bus.transport import Transport, open_bus
 from moire.cli.options import Options
@@ -10,11 +8,12 @@ from moire.errors import BadFile, PortError
 
 
 def name_of(options: Options) -> str:
-    """The port of --port or of the variable MOIRE_PORT; raises PortError."""
-    port = options.port or os.environ.get("MOIRE_PORT")
+    """The port of --port, of the variable MOIRE_PORT or of machine.toml; raises PortError."""
+    port = options.port
     if not port:
         raise PortError(
-            "no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage"
+            "no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage; 'moire "
+            "ports' lists them"
         )
     return port
 

@@ -18,6 +18,7 @@ from moire.client.axis import Axis
 from moire.client.bus import Bus
 from moire.client.node import Node
 from moire.client.records import Status
+from moire.description import AxisDescription, Description
 from moire.errors import MoireError
 
 WIDTH = 100  # of a line that is overwritten while a motion goes on
@@ -48,6 +49,7 @@ class Session:
         self.options, self.open_transport = options, open_transport or ports.open_port
         self.out, self.err = out or sys.stdout, err or sys.stderr
         self.opened: Bus | None = None
+        self.description = Description()
         # by address and axis: those whose drive this call has switched on, and those it may move
         self.switched_on: dict[tuple[int, int], Axis] = {}
         self.used: dict[tuple[int, int], Axis] = {}
@@ -56,7 +58,9 @@ class Session:
     def bus(self) -> Bus:
         """The bus of the port; it is opened if it is not open yet."""
         if self.opened is None:
-            self.opened = Bus(self.open(), answer_s=float(self.options.patience))
+            self.opened = Bus(
+                self.open(), tries=self.options.tries, answer_s=float(self.options.patience)
+            )
         return self.opened
 
     def open(self) -> Transport:
@@ -162,9 +166,16 @@ class Call:
         return self.bus.axis(self.options.address, self.options.axis)
 
     @property
+    def described(self) -> AxisDescription:
+        """The name of the axis, and the unit of its lengths."""
+        return self.session.description.at(self.options.address, self.options.axis)
+
+    @property
     def where(self) -> str:
         """The axis in words."""
-        return f"node {self.options.address} axis {self.options.axis}"
+        place = f"node {self.options.address} axis {self.options.axis}"
+        known = self.described
+        return f"{known.name}, {place}" if known.name in self.session.description.axes else place
 
     @property
     def watched(self) -> bool:
@@ -213,9 +224,11 @@ class Call:
         if not self.watched:
             return None
 
+        length = self.described.length
+
         def show(status: Status) -> None:
             self.overwrite(
-                f"{status.words:<18} {status.position_nm / 1e6:14.6f} mm  "
+                f"{status.words:<18} {length(status.position_nm):>17}  "
                 f"{status.velocity_mm_s:9.4f} mm/s"
             )
 

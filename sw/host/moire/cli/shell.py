@@ -7,15 +7,13 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from types import ModuleType
-
-import click
 
 from moire.cli.completion import candidates
 from moire.cli.parser import parse_line
 from moire.cli.session import Call, Session
 from moire.cli.signals import Ended
+from moire.description import settings_folder
 from moire.errors import MoireError
 
 readline: ModuleType | None
@@ -41,7 +39,7 @@ def run_shell(call: Call) -> None:
                     text = next_line(session, lines, person)
                 if text is None or text.strip() in LEAVE:
                     return
-                for planned in parse_line(help_line(text), call.options):
+                for planned in parse_line(help_line(text), call.options, session.description):
                     session.carry_out(planned)
             except MoireError as error:
                 if not person or alive.failed:
@@ -120,7 +118,7 @@ def history() -> Iterator[None]:
     if readline is None or not at_terminal():
         yield
         return
-    file = Path(click.get_app_dir("moire")) / "history"
+    file = settings_folder() / "history"
     try:
         readline.read_history_file(file)
     except OSError:

@@ -135,6 +135,14 @@ def waiting_time(text: str) -> Fraction:
     return seconds
 
 
+def speed_or_zero(text: str) -> Fraction:
+    """A speed in mm/s that is not below zero."""
+    speed: Fraction = units.parse_speed(text)
+    if speed < 0:
+        raise UnitError(f"'{text.strip()}' is below zero: write a speed such as 2mm/s")
+    return speed
+
+
 def home_method(text: str) -> str:
     """The name or the number of a homing method."""
     if text not in HOME_METHODS and not re.fullmatch(r"[0-9]+", text):
@@ -166,6 +174,7 @@ AXIS_OF_A_NODE = Value("axis", axis_of_a_node)
 LENGTH = Value("length", units.parse_length)
 DISTANCE = Value("length", above_zero(units.parse_length))
 ANGLE = Value("angle", units.parse_angle)
+SPEED = Value("speed", speed_or_zero)
 TIME = Value("time", units.parse_time)
 DURATION = Value("time", above_zero(units.parse_time))
 WAITING_TIME = Value("time", waiting_time)

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
+from math import inf
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
@@ -22,6 +24,7 @@ from moire.client.records import (
     Encoder,
     IndexSurvey,
     Progress,
+    Sample,
     Signal,
     Status,
 )
@@ -92,6 +95,18 @@ class Axis(AxisParameters, AxisCapture):
                 raise
 
     # drive
+
+    @contextmanager
+    def enabled(self) -> Iterator[Self]:
+        """A block in which the drive is on; raises Refused while a fault is latched.
+
+        At its end a motion that is under way is stopped, and the drive is switched off if it was
+        off before.
+        """
+        with self:
+            if not self.status().enabled:
+                self.enable()
+            yield self
 
     def enable(self) -> None:
         """Switches the drive on; raises Refused while a fault is latched."""
@@ -381,6 +396,28 @@ class Axis(AxisParameters, AxisCapture):
             left = end - self.transport.now()
             if left <= 0:
                 return status
+            self.node.bus.until_next_poll(self.node, min(self.node.bus.poll_s, left))
+
+    def samples(
+        self, every: units.Value = "20ms", duration: units.Value | None = None
+    ) -> Iterator[Sample]:
+        """The status of the axis every so often, in the time of its bus: for a duration, or as long
+        as anybody takes them. Both are texts with a unit, or numbers in s.
+
+        The first sample comes at once. Between samples the axis hears requests often enough for its
+        watchdog, so a drive stays on while they are taken.
+        """
+        step_s, now = float(units.parse_time(every)), self.transport.now
+        shown = now()
+        end = inf if duration is None else shown + float(units.parse_time(duration))
+        while True:
+            status = self.status()
+            if now() >= shown:
+                shown = max(shown + step_s, now())
+                yield Sample(now(), status)
+            if now() >= end:
+                return
+            left = max(0.0, min(shown, end) - now())
             self.node.bus.until_next_poll(self.node, min(self.node.bus.poll_s, left))
 
     def stop(self) -> None:

@@ -2,11 +2,11 @@
 """The nodes on one RS-485 bus.
 
     with SerialBus("/dev/ttyUSB0") as port:
-        with Bus(port).axis(address=1) as axis:
-            axis.enable()
+        with Bus(port).axis(address=1).enabled() as axis:
             axis.home()
             print(axis.move(mm=1.5).position_nm)
 
+moire.connect() opens port and bus together, and knows the names of axes.
 A drive stays on only while this host sends requests: the watchdog of a node switches it off when
 it has heard nothing for the time `watchdog_time`. While the host waits for one node, it also polls
 the others whose drives it has switched on.
@@ -41,6 +41,7 @@ RATES = (
     19_200,
     9_600,
 )
+TRIES = 5  # of a request, unless a Bus is given another number
 ANSWER_S = 0.1  # patience with a node, unless a Bus is given another time
 POLL_S = 0.05  # between two polls of a motion, unless a Bus is given another time
 
@@ -60,7 +61,7 @@ class Bus:
     def __init__(
         self,
         transport: Transport,
-        tries: int = 5,
+        tries: int = TRIES,
         answer_s: float = ANSWER_S,
         random_source: random.Random | None = None,
         poll_s: float = POLL_S,
@@ -128,7 +129,7 @@ class Bus:
         here: whoever waits for it learns that.
         """
         self.transport.wait(self.poll_s if seconds is None else seconds)
-        for node in self.nodes.values():
+        for node in list(self.nodes.values()):  # another thread may add one
             if node is not polled and node.switched_on:
                 try:
                     self.exchange(node.address, "position", tries=1, axis=min(node.switched_on))

@@ -4,7 +4,7 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from fractions import Fraction
-from typing import Any, TypedDict
+from typing import Any, NamedTuple, TypedDict
 
 from moire.bus.protocol import IN_MOTION
 from moire.client.names import descriptions
@@ -109,6 +109,13 @@ class Status:
             "fault_words": self.fault_words,
             "ended_words": self.ended_words,
         }
+
+
+class Sample(NamedTuple):
+    """The status of an axis, and the time of its bus at which it was read, s."""
+
+    time_s: float
+    status: Status
 
 
 Progress = Callable[[Status], object]  # called with a Status from time to time during a motion

@@ -2,13 +2,13 @@
 """Parameters and settings: from text and real units to the counts on the bus, and back."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 from moire import units
 from moire.errors import OutOfRange, UnknownName
-from moire.made.bus_tables import PARAMETERS, Parameter
+from moire.made.bus_tables import PARAMETERS, SETTINGS, Parameter
 
 FILTERS = 2  # of the servo
 FILTER = ("b0", "b1", "b2", "a1", "a2")  # coefficients of a filter
@@ -66,6 +66,17 @@ class ParameterValue:
         if self.name in CHOICES:
             return CHOICES[self.name][self.counts]
         return units.with_unit(self.quantity, self.value, digits)
+
+    @property
+    def is_default(self) -> bool:
+        """Whether it has the value after power-up of a node without saved values."""
+        return self.value == self.default
+
+    @property
+    def default_written(self) -> str:
+        """The default, written as written() writes the value."""
+        counts = (PARAMETERS | SETTINGS)[self.name].default
+        return replace(self, counts=counts, value=self.default).written()
 
     def values(self) -> dict[str, Any]:
         """The value for JSON, with its range and its meaning."""

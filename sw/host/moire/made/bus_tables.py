@@ -24,13 +24,14 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xCA14FC65
+PROTOCOL_CRC = 0xD40D10C0
 VERSION = 1
 LONGEST_BODY = 64
 
 STREAM_SHORTEST = 2  # fewest ticks from one set-point of a stream to the next
 STREAM_LONGEST = 256  # most ticks from one set-point of a stream to the next
 STREAM_LATEST = 400  # largest late_limit, in ticks
+WAVEFORM_LONGEST = 4096  # most values of the waveform of an excitation
 STREAM_TOLERANCE = 10  # bits b: a stream may exceed its limits by 2^-b of them, for rounding
 
 # code: (name, words)
@@ -242,6 +243,16 @@ SCOPE_STATES = {
     3: ("full", "complete"),
 }
 
+# bit: (name, words)
+TICK_SIGNALS = {
+    0: ("sine_cosine", "samples of sine, lower half, and cosine, upper half"),
+    1: ("target", "target, low word, 2^-16 period"),
+    2: ("target_velocity", "velocity of the target, 2^-16 period per tick"),
+    3: ("velocity", "measured velocity, 2^-16 period per tick"),
+    4: ("error", "target - position, 2^-16 period"),
+    5: ("command", "command to the drive, full scale 2^15"),
+}
+
 # code: (name, words)
 TURN_PHASES = {
     0: ("idle", "at rest"),
@@ -415,7 +426,7 @@ OPERATIONS = {operation.name: operation for operation in (
               (("faults", "u16"), ("first", "u16"),)),
     Operation("write_register", 19,
               "one word of the register map: only index, capture and compare of the feedback "
-              "channels",
+              "channels, and in the image `stream` the set-points and requests of a host",
               (("address", "u16"), ("value", "u32"),),
               ()),
     Operation("prepare", 20, "plan a motion to a position, and wait for start",
@@ -483,6 +494,42 @@ OPERATIONS = {operation.name: operation for operation in (
                ("position_3", "i32"), ("error_3", "i32"), ("command_3", "i16"),
                ("time_3", "u16"), ("position_4", "i32"), ("error_4", "i32"),
                ("command_4", "i16"), ("time_4", "u16"),)),
+    Operation("record_ticks", 28,
+              "record signals of an axis at each servo tick, or one tick in so many: bits of a "
+              "tick_signal, so many samples; while an excitation runs, the recording begins with "
+              "its first value",
+              (("axis", "u8"), ("signals", "u8"), ("every", "u16"),
+               ("samples", "u16"),),
+              ()),
+    Operation("read_ticks", 29,
+              "progress of that recording (a scope_state); once it is complete, its next words, "
+              "in order from `first` on: for each sample one word of each signal",
+              (),
+              (("state", "u8"), ("first", "u16"), ("word_0", "u32"),
+               ("word_1", "u32"), ("word_2", "u32"), ("word_3", "u32"),
+               ("word_4", "u32"), ("word_5", "u32"), ("word_6", "u32"),
+               ("word_7", "u32"), ("word_8", "u32"), ("word_9", "u32"),
+               ("word_10", "u32"), ("word_11", "u32"), ("word_12", "u32"),
+               ("word_13", "u32"),)),
+    Operation("load_excitation", 39,
+              "values of the waveform of an excitation from this number on, full scale 2^15; "
+              "nothing is stored behind value 4096 - 1",
+              (("first", "u16"), ("value_0", "i16"), ("value_1", "i16"),
+               ("value_2", "i16"), ("value_3", "i16"), ("value_4", "i16"),
+               ("value_5", "i16"), ("value_6", "i16"), ("value_7", "i16"),
+               ("value_8", "i16"), ("value_9", "i16"), ("value_10", "i16"),
+               ("value_11", "i16"), ("value_12", "i16"), ("value_13", "i16"),
+               ("value_14", "i16"), ("value_15", "i16"), ("value_16", "i16"),
+               ("value_17", "i16"), ("value_18", "i16"), ("value_19", "i16"),
+               ("value_20", "i16"), ("value_21", "i16"), ("value_22", "i16"),
+               ("value_23", "i16"),),
+              ()),
+    Operation("excite", 46,
+              "add that waveform, of so many values, to the commands of an axis whose drive is "
+              "on, one value at each servo tick; 0 ends it, and so does any request to the axis "
+              "to move, home, stop or switch off",
+              (("axis", "u8"), ("period", "u16"),),
+              ()),
     Operation("step_fine", 37,
               "add an offset to the DAC of the fine stage, in open loop, and record the phase "
               "from then on, one in so many samples; before the first step both loops open, the "

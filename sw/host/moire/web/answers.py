@@ -14,10 +14,11 @@ from typing import Any
 
 from moire.errors import MoireError
 from moire.web.access import Access, too_many
-from moire.web.api import Call, Operation, checked, find, whole_number
+from moire.web.api import AXIS, Call, Operation, checked, find, whole_number
 from moire.web.bridge import Bridge, Client
 from moire.web.refusals import BadRequest, body_of, status_of
 
+BY_NAME, LONGEST_NAME = "/api/axes/", 40
 MOST_AT_ONCE = 8  # requests of one client in progress
 
 Answer = tuple[dict[str, Any], HTTPStatus]
@@ -91,8 +92,14 @@ async def perform(
         client.heard = time.monotonic()
 
 
-def operation_for(method: str, path: str) -> tuple[Operation, Mapping[str, str]]:
-    """The operation of a path, and what the path names; raises BadRequest."""
+def operation_for(bridge: Bridge, method: str, path: str) -> tuple[Operation, Mapping[str, str]]:
+    """The operation of a path, and what the path names; raises BadRequest. An axis may be named by
+    its node and number, or by its name in the description of the machine: /api/axes/x.
+    """
+    if path.startswith(BY_NAME):
+        name, slash, more = path.removeprefix(BY_NAME).partition("/")
+        node, axis = bridge.description.axis(name[:LONGEST_NAME]).place
+        path = AXIS.format(node=node, axis=axis) + slash + more
     found, methods = find(method, path)
     if found is not None:
         return found

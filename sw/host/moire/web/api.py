@@ -6,7 +6,7 @@ server and the OpenAPI document are made from it.
 import asyncio
 import re
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields
 from fractions import Fraction
 from http import HTTPStatus
 from importlib.metadata import version
@@ -19,15 +19,17 @@ from moire.bus.protocol import ADDRESSES
 from moire.client import remedies
 from moire.client.access import COUNTS
 from moire.client.axis import REACT_S, Axis
+from moire.client.groups import group_of
+from moire.client.job import ACTIONS, Job
 from moire.client.names import CAUSE_CODES, descriptions
 from moire.client.parameters import TRAVEL
 from moire.client.records import Identity, Status
+from moire.client.segments import Segments, SegmentTable
 from moire.client.values import ParameterValue
 from moire.errors import MoireError, NoAnswer, Refused
 from moire.made.bus_tables import FAULTS, PARAMETERS
-from moire.web import lissajous, recording
+from moire.web import calibrating, lissajous, recording
 from moire.web.bridge import Bridge, Client, Moment
-from moire.web.groups import group_of
 from moire.web.jog import HOLD_S
 from moire.web.refusals import BadRequest
 
@@ -169,6 +171,8 @@ async def server(call: Call) -> Values:
         "packet_clients": len(gateway.clients),
         "moved_by": {f"{node}.{axis}": owner for (node, axis), owner in moved.items()},
         "may_change": call.may_change,
+        "machine": bridge.description.text,
+        "names": {f"{one.node}.{one.axis}": one.name for one in bridge.description.axes.values()},
     }
 
 
@@ -207,6 +211,33 @@ def node_values(identity: Identity) -> Values:
         "clk_hz": identity.clk_hz,
         "tick_hz": identity.tick_hz,
     }
+
+
+JOB_FIELDS = ("state", "words", "cause_words", "station", "stations", "answers")
+
+
+async def job(call: Call) -> Values:
+    try:
+        state = await call.bridge.command_of_node(
+            call.client, call.node, lambda node: Job(node).state()
+        )
+    except Refused as refused:
+        if refused.cause not in ("not_built", "unknown_operation"):
+            raise
+        return {"built": False, **dict.fromkeys(JOB_FIELDS)}
+    return {"built": True, **{name: getattr(state, name) for name in JOB_FIELDS}}
+
+
+async def do_job(call: Call) -> Values:
+    action = call.given["action"]
+    if action not in ACTIONS:
+        raise BadRequest(
+            "out_of_range",
+            f"a job has no action '{action[:20]}'",
+            f"allowed are: {', '.join(ACTIONS)}",
+        )
+    await call.bridge.command_of_node(call.client, call.node, lambda node: Job(node).do(action))
+    return await job(call)
 
 
 # ------------------------------------------------------------------ an axis
@@ -436,6 +467,31 @@ async def signal(call: Call) -> Values:
     return await lissajous.measured(call.bridge, call.client, call.place, count, fresh)
 
 
+async def begin_calibration(call: Call) -> Values:
+    await calibrating.begin(call.bridge, call.client, call.place, call.given)
+    return await calibration(call)
+
+
+async def calibration(call: Call) -> Values:
+    return await calibrating.values_of(call.bridge, call.client, call.place)
+
+
+async def segments(call: Call) -> Values:
+    def read(axis: Axis) -> tuple[str, SegmentTable | None]:
+        status = Segments(axis).status()
+        return status.words(), Segments(axis).read() if status.loaded > 1 else None
+
+    words, table = await call.command(read, "long")
+    errors = table.errors if table else ()
+    return {
+        "words": words,
+        "border_nm": [float(table.first + n * table.length) for n in range(len(errors))]
+        if table
+        else [],
+        "error_nm": [float(error) for error in errors],
+    }
+
+
 # ------------------------------------------------------------------ parameters
 
 
@@ -465,12 +521,11 @@ async def set_parameters(call: Call) -> Values:
 
 def parameter_values(value: ParameterValue) -> Values:
     """A parameter, with its limits and its default as they are written."""
-    preset = replace(value, counts=PARAMETERS[value.name].default, value=value.default)
     return {
         **value.values(),
         "group": group_of(value.name),
         "allowed": value.range_words,
-        "default_written": preset.written(),
+        "default_written": value.default_written,
     }
 
 
@@ -516,6 +571,26 @@ PARAMETER = {
     "allowed": ("text", "the limits with their unit, or the names of the choices"),
     "default_written": ("text", "the default, written as `written` is"),
 }
+JOB = {
+    "built": ("flag", "whether the node is one of a station"),
+    "state": ("text or null", "state of the job"),
+    "words": ("text or null", "the state in words, with the number of the station"),
+    "cause_words": ("text or null", "why it waits, or did not continue"),
+    "station": ("whole number or null", "the station, from 0 on"),
+    "stations": ("whole number or null", "how many there are"),
+    "answers": ("list of texts or null", "the actions that it accepts now"),
+}
+CALIBRATION = {
+    "state": ("text", "none, running, done or ended"),
+    "words": ("text", "what it does, or why it has ended"),
+    "strokes": ("whole number", "strokes made"),
+    "accepted": ("whole number", "measurements that were used"),
+    "refused": ("whole number", "measurements that were not good enough"),
+    "scatter_nm": ("number or null", "standard error of the last measurement"),
+    "orders": ("list of numbers", "orders of the harmonics"),
+    "before_nm": ("list of numbers", "their amplitudes that were corrected before"),
+    "now_nm": ("list of numbers", "their amplitudes that are corrected now"),
+}
 NUMBER = ("whole number", "number of the record; no other one of this server has it")
 SCOPE = {
     "number": NUMBER,
@@ -555,6 +630,8 @@ OPERATIONS = (
             "packet_clients": ("whole number", "clients of TCP, RFC 2217 and the pseudo terminal"),
             "moved_by": ("map of texts", "by node.axis: the client that moved it last"),
             "may_change": ("flag", "false if the token of the request only reads"),
+            "machine": ("text", "the machine in words, from its description"),
+            "names": ("map of texts", "by node.axis: the name of the axis in the description"),
         },
     ),
     Operation(
@@ -576,6 +653,21 @@ OPERATIONS = (
     ),
     Operation("GET", "/api/nodes", "The nodes that answer.", nodes, {"nodes": ("list", "nodes")}),
     Operation("GET", "/api/nodes/{node}", "A node.", node, NODE),
+    Operation(
+        "GET",
+        "/api/nodes/{node}/job",
+        "How far the job of a station is (S4).",
+        job,
+        JOB,
+    ),
+    Operation(
+        "POST",
+        "/api/nodes/{node}/job",
+        "Begin, pause, resume or stop the job of a station, or answer it.",
+        do_job,
+        JOB,
+        given=(Given("action", "text", f"one of {', '.join(ACTIONS)}", "start", required=True),),
+    ),
     Operation("GET", AXIS, "State, position and faults of an axis.", status, STATUS, given=(AGE,)),
     Operation(
         "GET",
@@ -725,6 +817,9 @@ OPERATIONS = (
         {
             "cos": ("list of numbers", "samples of the cosine, ADC counts"),
             "sin": ("list of numbers", "samples of the sine, ADC counts"),
+            "amplitude": ("list of numbers", "amplitude at each sample, ADC counts"),
+            "position_nm": ("list of numbers", "position soon after each sample"),
+            "limits": ("list of numbers", "smallest and largest good amplitude, if they are set"),
             "ellipse": (
                 "map of numbers or null",
                 "offsets, amplitudes and deviation (rms) in ADC counts, quadrature_error_deg; null "
@@ -739,6 +834,36 @@ OPERATIONS = (
             Given("samples", "whole number", f"how many to take, 1 to {lissajous.MOST}", 32),
             Given("fresh", "flag", "whether to forget the earlier samples first", True),
         ),
+    ),
+    Operation(
+        "POST",
+        f"{AXIS}/calibration",
+        "Calibrate sine and cosine from scratch, as 'moire calibrate' does: the axis moves to and "
+        "fro until the correction is complete. GET says how far it is; a stop of the axis ends it.",
+        begin_calibration,
+        CALIBRATION,
+        given=(
+            Given("distance", "length", f"how far it moves, {LENGTH}; 1mm if not given", "1 mm"),
+            Given("timeout", "time", "after which it gives up; 120s if not given", "120s"),
+        ),
+    ),
+    Operation(
+        "GET",
+        f"{AXIS}/calibration",
+        "How far the calibration is, and the harmonics that are corrected.",
+        calibration,
+        CALIBRATION,
+    ),
+    Operation(
+        "GET",
+        f"{AXIS}/segments",
+        "The segment table of an axis: the error of its scale over the position.",
+        segments,
+        {
+            "words": ("text", "whether the table is in force, and why not"),
+            "border_nm": ("list of numbers", "positions of the borders; empty without a table"),
+            "error_nm": ("list of numbers", "errors of the scale there"),
+        },
     ),
     Operation(
         "GET",

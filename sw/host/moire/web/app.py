@@ -104,7 +104,7 @@ async def of_http(doors: Doors, request: Request) -> dict[str, Any]:
     """The answer to a request; raises MoireError."""
     connection: Connection = request.state.connection
     method = "GET" if request.method == "HEAD" else request.method
-    operation, path = operation_for(method, request.url.path)
+    operation, path = operation_for(doors.bridge, method, request.url.path)
     may_change = doors.access.check(request.headers, None, operation.changes)
     if not operation.urgent:
         connection.meter.count()

@@ -27,12 +27,15 @@ from moire.client.access import length_of_counts, status_of
 from moire.client.axis import Axis
 from moire.client.bus import Bus, accepted
 from moire.client.names import CAUSE_CODES
+from moire.client.node import Node
 from moire.client.records import Identity, Status
+from moire.description import Description
 from moire.errors import BusError, MoireError, NoAnswer, OutOfRange, PortError, Refused
 from moire.made.bus_tables import PARAMETERS
 from moire.web.jog import Jog
 
 if TYPE_CHECKING:
+    from moire.web.calibrating import Run
     from moire.web.recording import Recording
 
 LEASE_S = 5.0  # of the clock: a client that has asked nothing for so long has left
@@ -43,6 +46,7 @@ LOOK_S = 0.002  # of the clock, between two looks at the time of the bus
 # of the clock: so long a node that has not answered is not asked again, since that keeps all others
 # waiting; and one that has never answered
 ABSENT_S, NEVER_S = 1.0, 10.0
+NO_NAMES = Description()
 THREADS = {"short": 8, "long": 2}  # for commands, and for what takes a hundred exchanges
 
 Result = TypeVar("Result")
@@ -56,8 +60,11 @@ class Client:
     def __init__(self, name: str, given: str | None = None):
         self.name, self.given, self.heard = name, given, time.monotonic()
         self.busy = 0  # requests in progress
-        # its last samples of (cosine, sine) by axis, see moire.web.lissajous
-        self.samples: dict[Place, deque[tuple[int, int]]] = {}
+        # of its requests: two in a row are not alike, or the second would be taken for a repeated
+        # one, whatever others have asked in between
+        self.numbers = itertools.count()
+        # its last samples of sine and cosine by axis, see moire.web.lissajous
+        self.samples: dict[Place, deque[tuple[int, int, int, float]]] = {}
         self.left = False
 
     def __str__(self) -> str:
@@ -74,8 +81,8 @@ class Moment(NamedTuple):
 class Bridge:
     """All clients of the doors in front of one gateway."""
 
-    def __init__(self, gateway: Gateway):
-        self.gateway = gateway
+    def __init__(self, gateway: Gateway, description: Description = NO_NAMES):
+        self.gateway, self.description = gateway, description
         self.loop: asyncio.AbstractEventLoop | None = None  # that of the doors
         self.numbers = itertools.count()
         self.open: set[Future[Sample | None]] = set()  # what has been asked and not answered
@@ -86,6 +93,7 @@ class Bridge:
         self.seen: set[int] = set()  # addresses that have ever answered
         self.jogs: dict[tuple[Client, Place], Jog] = {}
         self.recordings: dict[int, Recording] = {}  # by address, the last one of each scope
+        self.calibrations: dict[Place, Run] = {}  # the last one of each axis
         self.pools = {
             name: ThreadPoolExecutor(count, f"moire-{name}") for name, count in THREADS.items()
         }
@@ -119,7 +127,8 @@ class Bridge:
             result = None if reply is None else Sample(self.gateway.time, reply[1:])
             settle(partial(future.set_result, result))
 
-        number = bytes([next(self.numbers) % 256])
+        numbers = client.numbers if isinstance(client, Client) else self.numbers
+        number = bytes([next(numbers) % 256])
         waiting = Waiting(client, address, number + body, answer)
         self.gateway.call_soon(partial(self.enqueue, waiting))
         return future
@@ -175,10 +184,16 @@ class Bridge:
         self, client: Hashable, place: Place, work: Callable[[Axis], Result], pool: str = "short"
     ) -> Result:
         """Calls the host package's own client code for an axis, in a thread that may wait."""
+        return await self.in_thread(lambda: work(ClientBus(self, client).axis(*place)), pool)
 
-        def call() -> Result:
-            return work(ClientBus(self, client).axis(*place))
+    async def command_of_node(
+        self, client: Hashable, address: int, work: Callable[[Node], Result]
+    ) -> Result:
+        """The same for a node."""
+        return await self.in_thread(lambda: work(ClientBus(self, client).node(address)), "short")
 
+    async def in_thread(self, call: Callable[[], Result], pool: str) -> Result:
+        """The result of a call in a thread of a pool."""
         assert self.loop is not None
         return await self.loop.run_in_executor(self.pools[pool], call)
 

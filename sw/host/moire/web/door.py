@@ -24,11 +24,12 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from moire.bus.gateway import Gateway
+from moire.description import Description
 from moire.errors import PortError
 from moire.web.access import Access, Meter, is_loopback, kept_token
 from moire.web.answers import Doors, text_of
 from moire.web.app import application
-from moire.web.bridge import LEASE_S, Bridge, Client
+from moire.web.bridge import LEASE_S, NO_NAMES, Bridge, Client
 from moire.web.refusals import BadRequest, body_of
 
 REQUEST_S = 5.0  # of the clock, for the head of a request to arrive
@@ -53,6 +54,7 @@ class Settings:
     read_token: Path | None = None
     certificate: Path | None = None  # of TLS, with its key
     key: Path | None = None
+    description: Description = NO_NAMES  # of the machine: names of its axes
 
 
 @dataclass
@@ -179,7 +181,7 @@ class WebDoor:
     """
 
     def __init__(self, gateway: Gateway, settings: Settings):
-        self.bridge, self.settings = Bridge(gateway), settings
+        self.bridge, self.settings = Bridge(gateway, settings.description), settings
         self.made: dict[Path, str] = {}
         token = settings.token
         if token is None and not is_loopback(settings.host):

@@ -16,7 +16,8 @@ from moire.web.refusals import BadRequest
 KEPT = 512  # of a client and an axis
 MOST, AT_FIRST = 128, 32  # of one request, and how many if it does not say
 
-Samples = deque[tuple[int, int]]  # (cosine, sine) in ADC counts
+# (cosine, sine, amplitude) in ADC counts, and the position in nm
+Samples = deque[tuple[int, int, int, float]]
 
 
 def limits_of(axis: Axis) -> Limits | None:
@@ -53,12 +54,13 @@ async def measured(
     for _ in range(count):
         fields = fields_of(await bridge.ask(place[0], request("encoder", axis=place[1])), place[0])
         newest = fields["cos"], fields["sin"]
-        if not samples or samples[-1] != newest:
-            samples.append(newest)
+        if not samples or samples[-1][:2] != newest:
+            _, position_nm = await bridge.position(place, bridge.gateway.time)
+            samples.append((*newest, fields["amplitude"], position_nm))
     return values_of(list(samples), limits)
 
 
-def values_of(samples: list[tuple[int, int]], limits: Limits | None) -> dict[str, Any]:
+def values_of(samples: list[tuple[int, int, int, float]], limits: Limits | None) -> dict[str, Any]:
     """The answer."""
     cos, sin = ([one[n] for one in samples] for n in (0, 1))
     curve: dict[str, list[float]] = {"cos": [], "sin": []}
@@ -74,6 +76,9 @@ def values_of(samples: list[tuple[int, int]], limits: Limits | None) -> dict[str
     return {
         "cos": cos,
         "sin": sin,
+        "amplitude": [one[2] for one in samples],
+        "position_nm": [one[3] for one in samples],
+        "limits": [] if limits is None else [limits.low, limits.high],
         "ellipse": ellipse,
         "curve": curve,
         "verdict": verdict.kind,

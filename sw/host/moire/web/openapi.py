@@ -21,6 +21,8 @@ SCHEMAS: Mapping[str, dict[str, Any]] = {  # of the types that the table names
     "number": {"type": "number"},
     "text or null": {"type": ["string", "null"]},
     "number or null": {"type": ["number", "null"]},
+    "whole number or null": {"type": ["integer", "null"]},
+    "list of texts or null": {"type": ["array", "null"], "items": {"type": "string"}},
     "list of texts": {"type": "array", "items": {"type": "string"}},
     "list": {"type": "array", "items": {"type": "object"}},
     "list of numbers": {"type": "array", "items": {"type": "number"}},

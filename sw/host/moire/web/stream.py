@@ -150,7 +150,7 @@ class Session:
                 )
             if body is not None and not isinstance(body, dict):
                 raise BadRequest("wrong_type", "'body' is no object", "write its fields")
-            operation, names = operation_for(method, path)
+            operation, names = operation_for(self.doors.bridge, method, path)
             may_change = self.doors.access.check(self.socket.headers, self.token, operation.changes)
             if not operation.urgent:
                 self.meter.count()

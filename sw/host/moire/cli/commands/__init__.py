@@ -5,6 +5,7 @@ the parser does when a command is used: a call of one command does not wait for 
 
 SECTIONS = {  # of the help: every command, and the module of this package that makes it
     "Nodes": {
+        "ports": "ports",
         "find": "nodes",
         "built": "built",
         "counters": "nodes",
@@ -32,7 +33,13 @@ SECTIONS = {  # of the help: every command, and the module of this package that 
         "drive": "drive",
     },
     "Faults": {"fault": "fault", "reset": "axis"},
-    "Parameters and tuning": {"params": "params", "tune": "tune", "fine": "fine", "scope": "scope"},
+    "Parameters and tuning": {
+        "params": "params",
+        "machine": "machine",
+        "tune": "tune",
+        "fine": "fine",
+        "scope": "scope",
+    },
     "Sensor": {
         "encoder": "sensor",
         "signal": "sensor",

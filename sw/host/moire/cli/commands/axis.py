@@ -102,11 +102,11 @@ def say_status(call: Call, status: Status, **built: Any) -> None:
         (status.estop, "emergency stop pressed"),
     )
     switches = [text for pressed, text in possible if pressed]
-    error_nm = status.target_nm - status.position_nm
+    error_nm, length = status.target_nm - status.position_nm, call.described.length
     limited = ", at its limit" if status.saturated else ""
     rows = [
-        ("position", f"{status.position_nm / 1e6:.6f} mm   {status.counts} counts"),
-        ("target", f"{status.target_nm / 1e6:.6f} mm   error {error_nm:.1f} nm"),
+        ("position", f"{length(status.position_nm)}   {status.counts} counts"),
+        ("target", f"{length(status.target_nm)}   error {error_nm:.1f} nm"),
         ("velocity", f"{status.velocity_mm_s:.4f} mm/s"),
         ("command", f"{100 * status.drive_command:.1f} %{limited}"),
         ("switches", ", ".join(switches) or "free"),

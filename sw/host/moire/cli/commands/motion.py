@@ -134,10 +134,11 @@ def start(call: Call, axes: tuple[tuple[int | None, int], ...]) -> None:
         }
         for (address, axis), status in zip(places, ended)
     ]
+    described = call.session.description.at
     rows = [
-        f"node {report['address']} axis {report['axis']}: at {report['position_nm'] / 1e6:.6f} mm, "
+        f"node {address} axis {axis}: at {described(address, axis).length(report['position_nm'])}, "
         f"error {report['error_nm']:.1f} nm"
-        for report in reports
+        for (address, axis), report in zip(places, reports)
     ]
     call.say({"axes": reports, "time_s": seconds}, "\n".join(rows))
 
@@ -202,7 +203,7 @@ def run_motion(
     }
     call.say_of_axis(
         values,
-        f"{call.where}: at {status.position_nm / 1e6:.6f} mm, error {error_nm:.1f} nm, "
+        f"{call.where}: at {call.described.length(status.position_nm)}, error {error_nm:.1f} nm, "
         f"after {seconds:.3f} s",
     )
 

@@ -1,29 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands about the parameters of an axis: params list, get, set, save, load, save-to-node,
-saved-in-node, restore-defaults.
+"""The commands about the parameters of an axis: params list, get, set, save, load, diff,
+save-to-node, saved-in-node, restore-defaults.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict
+from fractions import Fraction
 from typing import Any
 
 import click
 
-from moire.cli.files import are_texts, read_json, write_json
+from moire.cli.files import read_json, write_text
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.tables import add_value_commands
 from moire.cli.values import FILE
+from moire.client import parameter_file
 from moire.client.axis import Axis
 from moire.client.nonvolatile import SavedSettings
 from moire.client.segments import Segments
-from moire.client.values import whole as is_whole
-from moire.errors import BadFile, Refused
+from moire.client.values import ParameterValue
+from moire.description import read_toml
+from moire.errors import Refused
 from moire.made.bus_tables import PARAMETERS
 
 group = Group(
     "params",
     help="Show, set, save and load the parameters of an axis.",
-    example="moire --port /dev/ttyUSB0 params set velocity 5mm/s -- params save stage.json",
+    example="moire --port /dev/ttyUSB0 params set velocity 5mm/s -- params save stage.toml",
 )
 moire.add_command(group)
 
@@ -52,15 +56,22 @@ add_value_commands(
 
 @group.command(
     "save",
-    help="Save all parameters, and the segment table if there is one, in a JSON file.",
-    example="moire --port twin params save stage.json",
+    help="Save all parameters, and the segment table if there is one, in a TOML file with comments "
+    "or, if its name ends with .json, a JSON file.",
+    example="moire --port twin params save stage.toml",
 )
 @click.argument("file", type=FILE, metavar="FILE", help="The file to write.")
 def save(call: Call, file: str) -> None:
     """For 'params load'."""
     axis = call.axis
-    saved, points = axis.save_parameters(), segment_points(axis)
-    write_json(file, {"parameters": saved} | ({"segment_points": points} if points else {}))
+    saved, points = axis.parameters(), segment_points(axis)
+    is_json = file.endswith(".json")
+    write_text(
+        file,
+        parameter_file.json_of(saved.values(), points)
+        if is_json
+        else parameter_file.toml_of(saved.values(), points, call.where),
+    )
     call.say_of_axis(
         {"file": file, "count": len(saved)}, f"{amount(saved, points)} saved in {file}"
     )
@@ -68,8 +79,8 @@ def save(call: Call, file: str) -> None:
 
 @group.command(
     "load",
-    help="Load the parameters from a JSON file. All are checked before the first is written.",
-    example="moire --port twin params load stage.json",
+    help="Load the parameters from a file. All are checked before the first is written.",
+    example="moire --port twin params load stage.toml",
 )
 @click.argument("file", type=FILE, metavar="FILE", help="The file of 'params save'.")
 def load(call: Call, file: str) -> None:
@@ -82,6 +93,38 @@ def load(call: Call, file: str) -> None:
     loaded = axis.load_parameters(texts)
     call.say_of_axis(
         {"file": file, "count": len(loaded)}, f"{amount(loaded, points)} loaded from {file}"
+    )
+
+
+@group.command(
+    "diff",
+    help="Show the parameters that differ from their defaults, or from those in a file.",
+    example="moire --port /dev/ttyUSB0 params diff stage.toml",
+)
+@click.argument("file", type=FILE, metavar="FILE", required=False, help="A file of 'params save'.")
+def diff(call: Call, file: str | None) -> None:
+    """Changes nothing."""
+    axis = call.axis
+    if file is None:
+        other, name = "default", "default"
+        found = [
+            (value, value.default_written)
+            for value in axis.parameters().values()
+            if not value.is_default
+        ]
+    else:
+        other, name = "file", file
+        found = differing(axis, read_parameters(file)[0])
+    rows = [f"{value.name:<20}{value.written():<24}{name}: {there}" for value, there in found]
+    same = f"{call.where}: all parameters " + ("have their defaults" if file is None else "agree")
+    call.say_of_axis(
+        {
+            "differences": [
+                {"name": value.name, "value": value.written(), other: there}
+                for value, there in found
+            ]
+        },
+        "\n".join(rows) if rows else same,
     )
 
 
@@ -136,16 +179,22 @@ def segment_points(axis: Axis) -> list[int]:
         return []
 
 
-def read_parameters(file: str) -> tuple[dict[str, str], list[int]]:
+def read_parameters(file: str) -> tuple[Mapping[str, str], list[int]]:
     """The parameters in a file as text, and the points of its segment table in counts."""
-    content = read_json(file)
-    texts = content.get("parameters") if isinstance(content, dict) else None
-    if not are_texts(texts):
-        raise BadFile(
-            f"the file {file} holds no parameters: it must look like "
-            '{"parameters": {"velocity": "5mm/s"}}'
-        )
-    points = content.get("segment_points", [])
-    if not isinstance(points, list) or not all(map(is_whole, points)):
-        raise BadFile(f"the segment_points in the file {file} are no list of whole numbers")
-    return texts, points
+    return parameter_file.parsed(
+        read_json(file) if file.endswith(".json") else read_toml(file), file
+    )
+
+
+def differing(axis: Axis, texts: Mapping[str, str]) -> list[tuple[ParameterValue, str]]:
+    """The parameters of an axis that differ from these texts, and the values in the texts."""
+    counts = axis.check_parameters(texts)
+    period_nm = axis.period_nm
+    if "period" in counts:
+        period_nm = Fraction(counts["period"], 1000)
+    here = {name: axis.get_parameter(name) for name in texts}
+    return [
+        (here[name], axis.parameter_value(name, counts[name], period_nm).written())
+        for name in texts
+        if here[name].counts != counts[name]
+    ]

@@ -22,7 +22,7 @@ def run(call: Call, file: str) -> None:
     planned = []
     for number, text in enumerate(read_text(file).splitlines(), 1):
         try:
-            planned += parse_line(text, call.options)
+            planned += parse_line(text, call.options, call.session.description)
         except MoireError as error:
             raise UsageError(f"line {number} of {file}: {error}") from None
     for one in planned:

@@ -28,4 +28,5 @@ def serve(call: Call, duration: Fraction | None, **doors: Any) -> None:
         f"the bus at {port}",
         {"port": port},
         duration,
+        call.session.description,
     )

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command twin: serves a simulated machine over RFC 2217, TCP and a pseudo terminal."""
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -12,6 +13,7 @@ from moire.cli.options import FOR
 from moire.cli.parser import Several, moire
 from moire.cli.session import Call
 from moire.cli.values import ADDRESS, WHOLE, Name
+from moire.description import axes_of_twin
 from moire.errors import OutOfRange
 
 
@@ -57,6 +59,7 @@ def twin(
     settings: dict[str, Any] = {"nodes": tuple(dict.fromkeys(nodes))} if nodes else {}
     transport: Any = open_twin(call.options.baud, machine, seed, **settings)
     addresses = list(transport.addresses)
+    described = call.session.description
     words = f"{'nodes' if len(addresses) > 1 else 'node'} {', '.join(map(str, addresses))}"
     serve_doors(
         call,
@@ -65,4 +68,5 @@ def twin(
         f"simulated {MACHINES[machine]}; {words}",
         {"machine": machine, "nodes": addresses},
         duration,
+        described if described.axes else replace(described, axes=axes_of_twin(machine)),
     )

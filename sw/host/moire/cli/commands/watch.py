@@ -3,7 +3,6 @@
 
 from dataclasses import asdict
 from fractions import Fraction
-from math import inf
 
 import click
 
@@ -29,23 +28,14 @@ EVERY_S = 0.2
 @FOR
 def watch(call: Call, every: Fraction | None, duration: Fraction | None) -> None:
     """Polls between the rows too, so that the watchdog of the node leaves the drive on."""
-    axis, step_s = call.axis, float(every or EVERY_S)
-    began = shown = call.now()
-    end = inf if duration is None else began + float(duration)
-    while True:
-        status = axis.status()
-        if call.now() >= shown:
-            seconds = call.now() - began
-            error_nm = status.target_nm - status.position_nm
-            faults = f": {status.fault_words}" if status.faults else ""
-            call.say_of_axis(
-                {"time_s": seconds, **asdict(status)},
-                f"{seconds:9.3f} s  {status.position_nm / 1e6:14.6f} mm  "
-                f"error {error_nm:10.1f} nm  "
-                f"{status.velocity_mm_s:9.4f} mm/s  {status.words}{faults}",
-            )
-            shown = max(shown + step_s, call.now())
-        if call.now() >= end:
-            return
-        left = max(0.0, min(shown, end) - call.now())
-        call.bus.until_next_poll(axis.node, min(call.bus.poll_s, left))
+    began = call.now()
+    for sample in call.axis.samples(EVERY_S if every is None else every, duration):
+        seconds, status = sample.time_s - began, sample.status
+        error_nm = status.target_nm - status.position_nm
+        faults = f": {status.fault_words}" if status.faults else ""
+        call.say_of_axis(
+            {"time_s": seconds, **asdict(status)},
+            f"{seconds:9.3f} s  {call.described.length(status.position_nm):>17}  "
+            f"error {error_nm:10.1f} nm  "
+            f"{status.velocity_mm_s:9.4f} mm/s  {status.words}{faults}",
+        )

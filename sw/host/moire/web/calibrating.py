@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Calibrations of sine and cosine for the clients of the doors: the server carries one out, and
+clients ask how far it is. What was corrected before is kept for a comparison.
+"""
+
+import asyncio
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+from moire.bus.arbiter import Place
+from moire.client.axis import HARMONICS, Axis
+from moire.client.calibration import end_calibration
+from moire.client.records import CalibrationState, Correction
+from moire.client.values import ParameterValue
+from moire.errors import MoireError
+from moire.web.bridge import Bridge, Client
+from moire.web.refusals import BadRequest
+
+HARMONIC_LSB = 2.0**-24  # of a period
+ORDERS = range(1, HARMONICS + 1)
+
+
+@dataclass
+class Run:
+    """One calibration. `before` has the harmonics that were corrected at its beginning, in nm."""
+
+    client: Client
+    before: list[float]
+    velocity: ParameterValue  # of the axis, which has other ones meanwhile
+    state: str = "running"
+    words: str = "the calibration begins"
+    strokes: int = 0
+    latest: CalibrationState | None = None
+    task: "asyncio.Task[None] | None" = None
+
+    def progress(self, state: CalibrationState) -> None:
+        """A stroke has ended."""
+        self.strokes, self.latest, self.words = self.strokes + 1, state, state.words
+
+
+def harmonics_nm(axis: Axis) -> list[float]:
+    """The amplitude of each harmonic of the phase error that is corrected, by order, in nm."""
+    return amplitudes_nm(axis.correction(), float(axis.period_nm))
+
+
+def amplitudes_nm(correction: Correction, period_nm: float) -> list[float]:
+    """The amplitudes of the harmonics of a correction, in nm."""
+    terms = zip(correction["cosine"], correction["sine"], strict=True)
+    return [math.hypot(*both) * HARMONIC_LSB * period_nm for both in terms]
+
+
+async def begin(bridge: Bridge, client: Client, place: Place, given: Mapping[str, Any]) -> Run:
+    """Begins a calibration; raises BadRequest while another one is under way."""
+    found = bridge.calibrations.get(place)
+    if found is not None and found.state == "running":
+        raise BadRequest(
+            "calibrates_already",
+            f"axis {place[0]}.{place[1]} is being calibrated by {found.client}",
+            "wait until it has ended, or stop the axis",
+            HTTPStatus.CONFLICT,
+        )
+
+    def prepare(axis: Axis) -> Run:
+        run = Run(client, harmonics_nm(axis), axis.get_parameter("velocity"))
+        if not axis.status().enabled:
+            axis.enable_for("move")
+        return run
+
+    run: Run = await bridge.command(client, place, prepare)
+    bridge.calibrations[place] = run
+    distance, timeout = given.get("distance", "1mm"), given.get("timeout", "120s")
+    run.task = asyncio.create_task(carry_out(bridge, run, place, distance, timeout))
+    return run
+
+
+async def carry_out(bridge: Bridge, run: Run, place: Place, distance: str, timeout: Any) -> None:
+    """Carries a calibration out. If its client leaves meanwhile, the server ends it properly."""
+    try:
+        run.latest = await bridge.command(
+            run.client,
+            place,
+            lambda axis: axis.calibrate(run.progress, distance, timeout),
+            "long",
+        )
+        run.state, run.words = "done", "the correction is complete and frozen"
+    except MoireError as error:
+        run.state, run.words = "ended", str(error)
+        if run.client.left:
+            run.words = "its client has left"
+            await bridge.command(bridge, place, lambda axis: end_calibration(axis, run.velocity))
+
+
+async def values_of(bridge: Bridge, client: Client, place: Place) -> dict[str, Any]:
+    """How far the calibration of an axis is, and what is corrected now."""
+    run = bridge.calibrations.get(place)
+    now = await bridge.command(client, place, harmonics_nm)
+    latest = run.latest if run else None
+    return {
+        "state": run.state if run else "none",
+        "words": run.words if run else "this server has not calibrated the axis",
+        "strokes": run.strokes if run else 0,
+        "accepted": latest.accepted if latest else 0,
+        "refused": latest.refused if latest else 0,
+        "scatter_nm": latest.scatter_nm if latest else None,
+        "orders": list(ORDERS),
+        "before_nm": run.before if run else [],
+        "now_nm": now,
+    }

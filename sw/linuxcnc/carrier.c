@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "carrier.h"
+
+#include <asm/termbits.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { NS_PER_S = 1000000000, GROUP = 254 };  // COBS: most bytes after one count
+
+int64_t carrier_now(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * (int64_t)NS_PER_S + now.tv_nsec;
+}
+
+static const char* open_udp(struct carrier* carrier, const char* host, const char* port) {
+    struct addrinfo hints = {.ai_socktype = SOCK_DGRAM, .ai_family = AF_INET};
+    struct addrinfo* found;
+    if (getaddrinfo(host, port, &hints, &found) != 0) return "the address of the node is unknown";
+    carrier->file = socket(found->ai_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    int failed = carrier->file < 0 || connect(carrier->file, found->ai_addr, found->ai_addrlen);
+    freeaddrinfo(found);
+    return failed ? "there is no network route to the node" : NULL;
+}
+
+static const char* open_serial(struct carrier* carrier, const char* device, unsigned baud) {
+    carrier->file = open(device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (carrier->file < 0)
+        return errno == EBUSY ? "another program uses the serial port"
+                              : "the serial port cannot be opened";
+    struct termios2 settings;
+    if (ioctl(carrier->file, TCGETS2, &settings)) return "the device is no serial port";
+    if (flock(carrier->file, LOCK_EX | LOCK_NB) || ioctl(carrier->file, TIOCEXCL))
+        return "another program uses the serial port";
+    settings.c_iflag = settings.c_oflag = settings.c_lflag = 0;
+    settings.c_cflag = CS8 | CREAD | CLOCAL | BOTHER | BOTHER << IBSHIFT;
+    settings.c_ispeed = settings.c_ospeed = baud;
+    if (ioctl(carrier->file, TCSETS2, &settings)) return "the serial port refuses this baud rate";
+    return NULL;
+}
+
+const char* carrier_open(struct carrier* carrier, const char* where) {
+    char text[128], *last;
+    *carrier = (struct carrier){.file = -1};
+    if (strlen(where) >= sizeof text) return "the place of the node is too long";
+    strcpy(text, where);
+    char* first = strchr(text, ':');
+    last = strrchr(text, ':');
+    if (!first || first == last) return "write udp:HOST:PORT or serial:DEVICE:BAUD";
+    *first = *last = 0;
+    const char* why = "write udp:HOST:PORT or serial:DEVICE:BAUD";
+    carrier->serial = strcmp(text, "serial") == 0;
+    if (carrier->serial)
+        why = open_serial(carrier, first + 1, (unsigned)strtoul(last + 1, NULL, 10));
+    else if (strcmp(text, "udp") == 0)
+        why = open_udp(carrier, first + 1, last + 1);
+    if (why) carrier_close(carrier);
+    return why;
+}
+
+void carrier_close(struct carrier* carrier) {
+    if (carrier->file >= 0) close(carrier->file);
+    carrier->file = -1;
+}
+
+// Consistent overhead byte stuffing: the packet has no zero, and a zero ends it.
+static size_t stuffed(const uint8_t* packet, size_t length, uint8_t* out) {
+    size_t count_at = 0, end = 1;
+    for (size_t n = 0; n < length; n++) {
+        if (packet[n]) out[end++] = packet[n];
+        if (!packet[n] || end - count_at == GROUP + 1) {
+            out[count_at] = (uint8_t)(end - count_at);
+            count_at = end++;
+        }
+    }
+    out[count_at] = (uint8_t)(end - count_at);
+    out[end++] = 0;
+    return end;
+}
+
+// The packet in `length` stuffed bytes without the final zero; 0 if they are none.
+static size_t unstuffed(const uint8_t* in, size_t length, uint8_t* packet) {
+    size_t out = 0;
+    for (size_t n = 0; n < length;) {
+        size_t count = in[n++];
+        if (count == 0 || n + count - 1 > length || out + count - 1 > PACKET_LONGEST) return 0;
+        memcpy(packet + out, in + n, count - 1);
+        n += count - 1;
+        out += count - 1;
+        if (count > GROUP || n == length) continue;  // no zero follows
+        if (out == PACKET_LONGEST) return 0;
+        packet[out++] = 0;
+    }
+    return out;
+}
+
+bool carrier_send(struct carrier* carrier, const uint8_t* packet, size_t length) {
+    if (!carrier->serial) return send(carrier->file, packet, length, 0) == (ssize_t)length;
+    uint8_t bytes[sizeof carrier->stuffed];
+    size_t count = stuffed(packet, length, bytes);
+    return write(carrier->file, bytes, count) == (ssize_t)count;
+}
+
+static bool readable(const struct carrier* carrier, int64_t deadline) {
+    int64_t left = deadline - carrier_now();
+    if (left < 0) left = 0;
+    struct timespec wait = {.tv_sec = left / NS_PER_S, .tv_nsec = left % NS_PER_S};
+    struct pollfd poll = {.fd = carrier->file, .events = POLLIN};
+    return ppoll(&poll, 1, &wait, NULL) > 0 && poll.revents & POLLIN;
+}
+
+// The next whole packet among the received bytes of the serial port; 0: there is none yet. What is
+// no packet is dropped.
+static size_t take_stuffed(struct carrier* carrier, uint8_t* packet) {
+    uint8_t* end;
+    while ((end = memchr(carrier->stuffed, 0, carrier->received))) {
+        size_t length = (size_t)(end - carrier->stuffed);
+        size_t found = unstuffed(carrier->stuffed, length, packet);
+        carrier->received -= length + 1;
+        memmove(carrier->stuffed, end + 1, carrier->received);
+        if (found) return found;
+    }
+    if (carrier->received == sizeof carrier->stuffed) carrier->received = 0;
+    return 0;
+}
+
+// What has come without a wait; 0: no whole packet.
+static size_t take(struct carrier* carrier, uint8_t* packet) {
+    if (!carrier->serial) {
+        ssize_t count = recv(carrier->file, packet, PACKET_LONGEST, 0);
+        return count > 0 ? (size_t)count : 0;
+    }
+    for (;;) {
+        size_t found = take_stuffed(carrier, packet);
+        uint8_t* free = carrier->stuffed + carrier->received;
+        ssize_t count = 0;
+        if (!found) count = read(carrier->file, free, sizeof carrier->stuffed - carrier->received);
+        if (count <= 0) return found;
+        carrier->received += (size_t)count;
+    }
+}
+
+size_t carrier_receive(struct carrier* carrier, uint8_t* packet, int64_t deadline) {
+    for (;;) {
+        size_t length = take(carrier, packet);
+        if (length || !readable(carrier, deadline)) return length;
+    }
+}

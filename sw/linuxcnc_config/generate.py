@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes a configuration of LinuxCNC from a machine file.
+
+    python -m linuxcnc_config MACHINE --out FOLDER
+
+MACHINE is a machine of constraints/machines, or a .toml file. docs/linuxcnc.md describes the tables
+[linuxcnc] and [axis.linuxcnc] of a machine file.
+"""
+
+import random
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import jinja2
+
+from boards import machine as machines
+from boards.toml_file import Misfit, Table, read
+from linuxcnc_config.set_up import LONGEST_SESSION
+
+TEMPLATES = Path(__file__).resolve().parent / "templates"
+LETTERS = "XYZABCUVW"
+ROTARY = "ABC"
+LEAST_DELAY_MS = 4.0  # a set-point is sent when the next one is known, 8 servo ticks ahead
+MARGIN = 2.0  # of the following error that LinuxCNC sees, over the one of the delay
+SERVO_MS = 1.0
+
+
+@dataclass(frozen=True)
+class Joint:
+    """An axis as LinuxCNC has it: mm, or degrees."""
+
+    name: str
+    period_um: float  # or thousandths of a degree
+    low: float
+    high: float
+    velocity: float
+    acceleration: float
+    rest: float  # where it moves after homing
+    sequence: int  # in which it is homed
+    following: float  # largest difference between command and position
+
+    @property
+    def rotary(self) -> bool:
+        """Whether it is measured in degrees."""
+        return self.name in ROTARY
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """What a configuration of LinuxCNC is made from."""
+
+    name: str
+    file: str
+    title: str
+    address: int  # on the bus
+    bus: str  # port of the bus, for the set-up; empty: another program sets the link up
+    node: str  # real-time link, serial:DEVICE:BAUD or udp:HOST:PORT
+    delay_ms: float  # of a set-point
+    period_ns: int
+    axes: list[Joint]
+    session: int = 0  # of the link; 0: one is drawn for each configuration that is made
+    simulated: bool = False
+    display: str = "axis"
+    python: str = sys.executable  # that runs the set-up
+
+    @property
+    def behind_ms(self) -> float:
+        """How much later than commanded an axis is at a position, seen from LinuxCNC."""
+        return self.delay_ms + 2 * self.period_ns * 1e-6
+
+
+def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
+    """The table [axis.linuxcnc] of an axis."""
+    name, table = row.take("name", str), row.table("linuxcnc", True)
+    if name not in LETTERS or len(name) != 1:
+        raise row.misfit(f"name {name!r}: LinuxCNC knows the axes {', '.join(LETTERS)}")
+    travel = table.take("travel", list)
+    if len(travel) != 2 or not all(isinstance(end, int | float) for end in travel):
+        raise table.misfit("travel must be two numbers")
+    low, high = (float(end) for end in travel)
+    values = {key: table.take(key, float) for key in ("period_um", "velocity", "acceleration")}
+    for key, value in values.items():
+        if not value > 0:
+            raise table.misfit(f"{key} {value:g} must be above 0")
+    if low >= high:
+        raise table.misfit(f"travel from {low:g} to {high:g} has no length")
+    rest = table.take("rest", float, 0.0)
+    if not low <= rest <= high:
+        raise table.misfit(f"rest {rest:g} is outside the travel, {low:g} to {high:g}")
+    sequence = table.take("home_sequence", int, number)
+    table.close()
+    following = values["velocity"] * behind_ms * 1e-3 * MARGIN
+    return Joint(
+        name, low=low, high=high, rest=rest, sequence=sequence, following=following, **values
+    )
+
+
+def load(name: str) -> Configuration:
+    """The configuration of a machine; Misfit, one line, if its file does not describe one."""
+    machine = machines.named(name)
+    path = Path(name) if name.endswith(".toml") else machines.FOLDER / f"{name}.toml"
+    file = read(path)
+    if not any(axis.drives for axis in machine.axes):
+        raise file.misfit("no axis has a drive: LinuxCNC has nothing to move")
+    table = file.table("linuxcnc", True)
+    bus, node = table.take("bus", str), table.take("node", str)
+    if len(node.split(":")) < 3 or node.split(":")[0] not in ("udp", "serial"):
+        raise table.misfit(f"node {node!r}: write udp:HOST:PORT or serial:DEVICE:BAUD")
+    delay = table.take("delay_ms", float, 5.0)
+    if delay < LEAST_DELAY_MS:
+        raise table.misfit(f"delay_ms {delay:g}: a set-point needs {LEAST_DELAY_MS:g} at least")
+    table.close()
+    behind = delay + 2 * SERVO_MS
+    joints = [joint_of(row, number, behind) for number, row in enumerate(file.rows("axis"))]
+    period = round(SERVO_MS * 1e6)
+    return Configuration(
+        machine.name,
+        machine.file,
+        machine.title,
+        machine.address,
+        bus,
+        node,
+        delay,
+        period,
+        joints,
+    )
+
+
+def texts(found: Configuration) -> dict[str, str]:
+    """{file name: text} of a configuration."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    values = {
+        **{key: getattr(found, key) for key in Configuration.__dataclass_fields__},
+        "session": found.session or random.SystemRandom().randint(1, LONGEST_SESSION),
+        "behind_ms": found.behind_ms,
+        "letters": "".join(axis.name for axis in found.axes),
+        "velocity": max(axis.velocity for axis in found.axes),
+        "screen": found.display == "axis",
+    }
+    return {
+        f"{found.name}.{kind}": environment.get_template(f"machine.{kind}.jinja").render(values)
+        for kind in ("ini", "hal")
+    }
+
+
+OWN = {  # files that belong to the user: written only where there are none
+    "tool.tbl": "T1 P1 D1 Z0 ;the only tool so far\n",
+    "custom.hal": "# lines of HAL for this machine alone; run after the made file\n",
+}
+
+
+def write(found: Configuration, folder: Path) -> Path:
+    """Writes a configuration into a folder; returns its INI file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts(found).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    for name, text in OWN.items():
+        if not (folder / name).exists():
+            (folder / name).write_text(text, encoding="utf-8")
+    return folder / f"{found.name}.ini"
+
+
+__all__ = ["Configuration", "Joint", "Misfit", "load", "texts", "write"]

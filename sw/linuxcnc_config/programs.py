@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""G-code programs whose path is known: the text for LinuxCNC, and the distance of a point from the
+programmed path. Lengths in mm, in X, Y, Z.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy
+from numpy.typing import NDArray
+
+REST, STILL_MM, NEAR_MM = 40, 1e-6, 0.01  # rows of a path at rest, moved less, near a place
+
+DWELL, FIRST_LINE = "G4 P0.03", 5
+
+Points = NDArray[numpy.float64]  # n rows of X, Y, Z
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight move."""
+
+    start: Point
+    end: Point
+    rapid: bool = False
+
+    def code(self) -> str:
+        """The line of G-code."""
+        x, y, z = self.end
+        return f"{'G0' if self.rapid else 'G1'} X{x:.6f} Y{y:.6f} Z{z:.6f}"
+
+    def distances(self, points: Points) -> Points:
+        """Of each point from this move."""
+        start, end = numpy.array(self.start), numpy.array(self.end)
+        along = end - start
+        share = numpy.clip((points - start) @ along / max(along @ along, 1e-30), 0, 1)
+        found: Points = numpy.linalg.norm(points - start - share[:, None] * along, axis=1)
+        return found
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A circular move in the plane of X and Y, a helix if Z changes; `turn` in radians, positive
+    is counterclockwise."""
+
+    start: Point
+    centre: tuple[float, float]
+    turn: float
+    rise: float = 0.0
+
+    @property
+    def radius(self) -> float:
+        return math.dist(self.start[:2], self.centre)
+
+    def at(self, share: Points) -> Points:
+        """Points on the way, 0 to 1."""
+        first = math.atan2(self.start[1] - self.centre[1], self.start[0] - self.centre[0])
+        angle = first + self.turn * share
+        return numpy.stack(
+            [
+                self.centre[0] + self.radius * numpy.cos(angle),
+                self.centre[1] + self.radius * numpy.sin(angle),
+                self.start[2] + self.rise * share,
+            ],
+            axis=-1,
+        )
+
+    @property
+    def end(self) -> Point:
+        x, y, z = self.at(numpy.array([1.0]))[0]
+        return float(x), float(y), float(z)
+
+    def code(self) -> str:
+        """The line of G-code."""
+        x, y, z = self.end
+        i, j = self.centre[0] - self.start[0], self.centre[1] - self.start[1]
+        turns = math.ceil(abs(self.turn) / math.tau - 1e-9)
+        word = "G3" if self.turn > 0 else "G2"
+        return f"{word} X{x:.6f} Y{y:.6f} Z{z:.6f} I{i:.6f} J{j:.6f} P{max(1, turns)}"
+
+    def distances(self, points: Points) -> Points:
+        """Of each point from this move, at the angle of the point."""
+        first = math.atan2(self.start[1] - self.centre[1], self.start[0] - self.centre[0])
+        angle = numpy.arctan2(points[:, 1] - self.centre[1], points[:, 0] - self.centre[0])
+        turned = (angle - first) * numpy.sign(self.turn) % math.tau
+        best = numpy.full(len(points), numpy.inf)
+        for turn in range(-1, math.ceil(abs(self.turn) / math.tau) + 1):
+            share = numpy.clip((turned + turn * math.tau) / abs(self.turn), 0, 1)
+            best = numpy.minimum(best, numpy.linalg.norm(points - self.at(share), axis=1))
+        return best
+
+
+@dataclass
+class Program:
+    """A program from a start: each method adds a move."""
+
+    start: Point
+    feed: float  # mm/min
+    mode: str = "G61"  # of the path: exact, or G64 P… with a tolerance
+    moves: list[Line | Arc] = field(default_factory=list)
+
+    @property
+    def place(self) -> Point:
+        """Where it has come."""
+        return self.moves[-1].end if self.moves else self.start
+
+    def to(self, x: float, y: float, z: float, rapid: bool = False) -> "Program":
+        """A straight move."""
+        self.moves.append(Line(self.place, (x, y, z), rapid))
+        return self
+
+    def arc(self, x: float, y: float, turn: float, rise: float = 0.0) -> "Program":
+        """A circular move around a centre."""
+        self.moves.append(Arc(self.place, (x, y), turn, rise))
+        return self
+
+    def text(self) -> str:
+        """The G-code; the first move is in line FIRST_LINE."""
+        x, y, z = self.start
+        lines = [
+            "G21 G90 G17 G91.1 G40 G49",
+            f"{self.mode} F{self.feed:g}",
+            f"G0 X{x:.6f} Y{y:.6f} Z{z:.6f}",
+            DWELL,
+            *(move.code() for move in self.moves),
+            DWELL,
+            "M2",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def errors(self, path: Points) -> tuple[Points, Points]:
+        """Distances in mm of a path from the program while it was followed, and the path after
+        that. The path rests at the start and at the end of the program for REST rows at least;
+        ValueError if it does not do so in this order.
+        """
+        resting = numpy.linalg.norm(path[REST:] - path[:-REST], axis=1) < STILL_MM
+        began = first(resting & at(path, self.start), 0, "the start")
+        moved = first(~at(path, self.start), began, "a motion")
+        ended = first(resting & at(path, self.place), moved, "the end")
+        part = path[began:ended]
+        distances = numpy.min([move.distances(part) for move in self.moves], axis=0)
+        return distances, path[ended:]
+
+
+def at(path: Points, place: Point) -> NDArray[numpy.bool_]:
+    """Where a path is at a place, without its last rows."""
+    near: NDArray[numpy.bool_] = numpy.linalg.norm(path[:-REST] - place, axis=1) < NEAR_MM
+    return near
+
+
+def first(found: NDArray[numpy.bool_], since: int, what: str) -> int:
+    """The first row since one."""
+    rows = numpy.flatnonzero(found[since:])
+    if not len(rows):
+        raise ValueError(f"the path does not come to {what} of the program")
+    return since + int(rows[0])
+
+
+def circle(centre: tuple[float, float], radius: float, z: float, feed: float) -> Program:
+    """A full circle, from its leftmost point."""
+    x, y = centre
+    return Program((x - radius, y, z), feed).arc(x, y, -math.tau)
+
+
+def pocket(corner: tuple[float, float], size: float, step: float, z: float, feed: float) -> Program:
+    """A square, cleared in lines to and fro, then its wall."""
+    x, y = corner
+    found = Program((x, y, z + 1), feed).to(x, y, z)
+    for n in range(round(size / step) + 1):
+        ends = (x, x + size) if n % 2 else (x + size, x)
+        found.to(ends[1] if n == 0 else found.place[0], y + n * step, z).to(
+            ends[0], y + n * step, z
+        )
+    for end in ((x + size, y + size), (x + size, y), (x, y), (x, y + size)):
+        found.to(*end, z)
+    return found
+
+
+def helix(centre: tuple[float, float], radius: float, turns: int, z: float, feed: float) -> Program:
+    """A thread milled downwards."""
+    x, y = centre
+    return Program((x + radius, y, z), feed).arc(x, y, turns * math.tau, -0.5 * turns)
+
+
+def corners(start: Point, size: float, tolerance: float, feed: float) -> Program:
+    """A zigzag of sharp corners, blended within a tolerance."""
+    x, y, z = start
+    found = Program(start, feed, f"G64 P{tolerance:g}")
+    for n in range(1, 7):
+        found.to(x + n * size, y + size * (n % 2), z)
+    return found
+
+
+def moments(path: Sequence[Sequence[float]], periods_per_mm: float) -> Points:
+    """Rows of (time, positions in periods) as points in mm."""
+    found: Points = numpy.array(path)[:, 1:] / periods_per_mm
+    return found
+
+
+PROGRAMS = {
+    "circle": circle((15, 10), 5, 1, 600),
+    "pocket": pocket((10, 10), 3, 1, 1, 900),
+    "helix": helix((12, 12), 2, 3, 4, 600),
+    "corners": corners((5, 5, 2), 2, 0.05, 900),
+}

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The parts of the driver for LinuxCNC that need no LinuxCNC, compiled for this computer."""
+
+import ctypes
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from linuxcnc_config.headless import SOURCES
+from moire.made import link_tables as layout
+from twin.compiled.host_library import host_library
+
+ZLIB = Path("/usr/include/zlib.h")
+LONGEST = 4 * layout.LONGEST_WORDS
+OPTIONS = ["-std=gnu11", "-D_GNU_SOURCE", "-Wl,--no-as-needed", "-lz", "-lm"]
+NAMES = ("packet", "carrier", "node_clock")
+
+
+class Session(ctypes.Structure):
+    """struct link_session"""
+
+    _fields_ = [(name, ctypes.c_uint32) for name in ("session", "writes", "reads", "sequence")]
+
+
+class Reply(ctypes.Structure):
+    """struct link_reply"""
+
+    _fields_ = [
+        ("time", ctypes.c_uint32),
+        ("refused", ctypes.c_uint8 * len(layout.CAUSES)),
+        ("expired", ctypes.c_bool),
+        ("spare", ctypes.c_uint32),
+        ("values", ctypes.c_uint32 * layout.MOST_VALUES),
+    ]
+
+
+class Clock(ctypes.Structure):
+    """struct node_clock"""
+
+    _fields_ = [
+        *((name, ctypes.c_double) for name in ("nominal", "tick", "step", "now", "late", "base")),
+        ("base_tick", ctypes.c_uint32),
+        ("running", ctypes.c_bool),
+    ]
+
+
+class Motion(ctypes.Structure):
+    """struct motion"""
+
+    _fields_ = [(name, ctypes.c_double) for name in ("position", "velocity", "acceleration")]
+
+
+class Carrier(ctypes.Structure):
+    """struct carrier"""
+
+    _fields_ = [
+        ("file", ctypes.c_int),
+        ("serial", ctypes.c_bool),
+        ("received", ctypes.c_size_t),
+        ("stuffed", ctypes.c_uint8 * (LONGEST + 16)),
+    ]
+
+
+@cache
+def driver() -> ctypes.CDLL:
+    """The library; the test is skipped by name where zlib's header is not installed."""
+    if not ZLIB.exists():
+        pytest.skip("zlib1g-dev is not installed: make linuxcnc")
+    found = host_library("linuxcnc", [SOURCES / f"{name}.c" for name in NAMES], OPTIONS)
+    found.packet_request.restype = ctypes.c_size_t
+    found.packet_reply.restype = ctypes.c_bool
+    found.packet_reply_length.restype = ctypes.c_size_t
+    found.node_clock_tick.restype = ctypes.c_double
+    found.node_clock_drift.restype = ctypes.c_double
+    found.motion_through.restype = found.motion_after.restype = Motion
+    found.carrier_open.restype = ctypes.c_char_p
+    found.carrier_send.restype = ctypes.c_bool
+    found.carrier_receive.restype = ctypes.c_size_t
+    found.carrier_now.restype = ctypes.c_int64
+    return found

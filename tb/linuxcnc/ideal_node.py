@@ -1,0 +1,416 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A node with ideal axes behind its link: plays the registers that the driver for LinuxCNC reads
+and writes. Each request that is acted upon takes one servo period of the node's time (lockstep), or
+the time is that of a clock.
+"""
+
+import math
+import socket
+import struct
+import threading
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+
+from moire.made import link_tables as layout
+from moire.made.bus_tables import CAUSES as BUS_CAUSES
+from moire.made.bus_tables import FAULTS, STATES
+from moire.made.registers import BLOCKS, FIELDS, MAP_CRC, Field
+
+CLK_HZ = 2_400_000
+TICK = 600  # cycles
+PERIOD_CYCLES = 2400  # of a request in lockstep: 1 ms
+FIRMWARE_CYCLES = 12_000  # between two looks of the firmware at the requests
+POSITION_LSB = 1 << 16  # per period
+VELOCITY_LSB = 1 << 24  # per period and tick
+WORD = 1 << 32
+STATE = {name: code for code, (name, _) in STATES.items()}
+FAULT = {name: 1 << bit for bit, (name, _) in FAULTS.items()}
+CAUSE = {name: code for code, (name, _) in BUS_CAUSES.items()}
+OFF, PREPARED, STREAMING, EXTRAPOLATING, ENDED = range(5)
+NOT_ENDED, RELEASED, STOPPED, LATE, BY_FAULT = range(5)
+LOST = b"?"  # instead of a reply
+WATCHDOG_S = 0.05
+LATE_TICKS = 400  # longest extrapolation
+
+
+@cache
+def address(block: str, register: str, axis: int = 0) -> int:
+    """The byte address of the low word of a register."""
+    base, stride = BLOCKS[block]
+    offset = next(f.offset for f in FIELDS if (f.block, f.register) == (block, register))
+    return base + axis * stride + offset
+
+
+@cache
+def field_of(block: str, register: str, name: str) -> Field:
+    """A field of a register."""
+    return next(f for f in FIELDS if (f.block, f.register, f.field) == (block, register, name))
+
+
+def placed(block: str, register: str, **values: int) -> int:
+    """The word of a register with these fields."""
+    word = 0
+    for name, value in values.items():
+        found = field_of(block, register, name)
+        word |= (value & (1 << found.width) - 1) << found.low
+    return word
+
+
+def signed(value: int, bits: int) -> int:
+    return value - (1 << bits) if value >> (bits - 1) & 1 else value
+
+
+@dataclass
+class SetPoint:
+    """Where an axis is to be at a tick: periods, and periods per tick."""
+
+    tick: int
+    position: float
+    velocity: float
+
+    def later(self, ticks: float) -> "SetPoint":
+        """At constant velocity."""
+        return SetPoint(self.tick + math.ceil(ticks), self.position + self.velocity * ticks, 0)
+
+
+def between(a: SetPoint, b: SetPoint, tick: float) -> float:
+    """The position of the cubic through two set-points."""
+    ticks = b.tick - a.tick
+    u = (tick - a.tick) / ticks
+    h00, h10 = (1 + 2 * u) * (1 - u) ** 2, u * (1 - u) ** 2
+    h01, h11 = u * u * (3 - 2 * u), u * u * (u - 1)
+    return h00 * a.position + h01 * b.position + ticks * (h10 * a.velocity + h11 * b.velocity)
+
+
+@dataclass
+class IdealAxis:
+    """An axis that is where its target is."""
+
+    position: float = 1000.0  # periods, from the zero that it does not know yet
+    enabled: bool = False
+    homed: bool = False
+    state: int = STATE["off"]
+    faults: int = 0
+    first_fault: int = 0
+    requested: dict[str, int] = field(
+        default_factory=lambda: {"enable": 0, "home": 0, "stream": 0, "reset_faults": 0}
+    )
+    mode: int = OFF
+    ended: int = NOT_ENDED
+    queue: list[SetPoint] = field(default_factory=list)
+    done: SetPoint | None = None
+    fresh: set[str] = field(default_factory=set)
+    accepted: int = 0
+    late: int = 0
+    refused: int = 0
+    extrapolated: int = 0
+    home_ticks: int = 0  # until homing ends
+    velocity: float = 0.0
+
+    def fault(self, name: str) -> None:
+        """Latches a fault: the drive goes off."""
+        self.first_fault = self.first_fault or FAULT[name]
+        self.faults |= FAULT[name]
+        self.enabled, self.state = False, STATE["faulted"]
+        if self.mode not in (OFF, ENDED):
+            self.mode, self.ended = ENDED, BY_FAULT
+
+    def obey(self, asked: dict[str, int], tick: int) -> None:
+        """What the firmware does at each look at the requests."""
+        rose = {name: asked[name] and not self.requested[name] for name in asked}
+        self.requested = asked
+        if rose["reset_faults"] and not self.enabled:
+            self.faults = self.first_fault = 0
+            self.state = STATE["off"]
+        if rose["enable"] and not self.faults:
+            self.enabled, self.state = True, STATE["holding"]
+        if not asked["enable"] and self.enabled:
+            self.enabled, self.state = False, STATE["off"]
+            if self.mode not in (OFF, ENDED):
+                self.mode, self.ended = ENDED, STOPPED
+        if rose["home"] and self.state == STATE["holding"] and self.mode == OFF:
+            self.homed, self.state, self.home_ticks = False, STATE["homing"], 800
+        if rose["stream"] and self.state == STATE["holding"] and self.homed:
+            self.mode, self.ended, self.queue = PREPARED, NOT_ENDED, []
+            self.done = SetPoint(tick, self.position, 0)
+            self.accepted = self.late = self.refused = self.extrapolated = 0
+        if not asked["stream"]:
+            self.mode = OFF if self.mode in (OFF, PREPARED, ENDED, STREAMING) else self.mode
+
+    def commit(self, point: SetPoint, tick: int) -> None:
+        """Queues a set-point."""
+        complete, self.fresh = self.fresh == {"position", "velocity"}, set()
+        last = self.queue[-1] if self.queue else None
+        if self.mode not in (PREPARED, STREAMING, EXTRAPOLATING) or not complete:
+            self.refused += 1
+        elif point.tick <= tick + 4 or (last and point.tick < last.tick + 2):
+            self.late += 1
+        else:
+            self.accepted += 1
+            if self.mode == PREPARED:
+                self.done = SetPoint(tick, self.position, 0)
+            self.mode = STREAMING
+            self.queue.append(point)
+
+    def run(self, tick: int) -> None:
+        """A servo tick."""
+        before = self.position
+        if self.state == STATE["homing"]:
+            self.home_ticks -= 1
+            self.position -= self.position / max(1, self.home_ticks)
+            if self.home_ticks <= 0:
+                self.homed, self.state, self.position = True, STATE["holding"], 0.0
+        if self.mode in (STREAMING, EXTRAPOLATING) and self.done:
+            while self.queue and self.queue[0].tick <= tick:
+                self.done = self.queue.pop(0)
+            if self.queue:
+                self.mode = STREAMING
+                self.position = between(self.done, self.queue[0], tick)
+            else:
+                if tick > self.done.tick:
+                    self.mode = EXTRAPOLATING
+                    self.extrapolated += 1
+                self.position = self.done.position + self.done.velocity * (tick - self.done.tick)
+                if tick - self.done.tick > LATE_TICKS:
+                    self.mode, self.ended = ENDED, LATE
+        self.velocity = self.position - before
+
+
+class IdealNode:
+    """A node with `axes` ideal axes and its link."""
+
+    def __init__(self, axes: int, map_crc: int = MAP_CRC) -> None:
+        self.axes = [IdealAxis() for _ in range(axes)]
+        self.map_crc = map_crc
+        self.time = 0  # cycles
+        self.tick = 0
+        self.estop = False
+        self.pressed_at = self.heard_at = 0  # cycles
+        self.session, self.sequence = 0, 0
+        self.lists: dict[int, int] = {}
+        self.writes, self.reads, self.entry, self.drawn = 0, 0, 0, 0
+        self.refused = [0] * len(layout.CAUSES)
+        self.words: dict[int, int] = {}
+        self.path: list[tuple[float, ...]] = []  # each ms of a stream: time, positions
+        self.names: dict[int, Callable[[], int]] = {}
+        self._name_registers()
+
+    # ---- registers
+
+    def _name_registers(self) -> None:
+        names = self.names
+        names[address("node", "map_crc")] = lambda: self.map_crc
+        names[address("node", "build")] = lambda: placed("node", "build", axes=len(self.axes))
+        names[address("node", "clk_hz")] = lambda: CLK_HZ
+        names[address("node", "tick_period")] = lambda: TICK
+        names[address("node", "tick_count")] = lambda: self.tick % WORD
+        for n, axis in enumerate(self.axes):
+
+            def wide(register: str, value: Callable[[], float], n: int = n) -> None:
+                low = address("axis", register, n)
+                names[low] = lambda: round(value() * POSITION_LSB) % WORD
+                names[low + 4] = lambda: round(value() * POSITION_LSB) >> 32 & WORD - 1
+
+            wide("position", lambda axis=axis: axis.position)
+            wide("target", lambda axis=axis: axis.position)
+            names[address("axis", "built", n)] = lambda: placed("axis", "built", set_points=1)
+            names[address("axis", "state", n)] = lambda axis=axis: placed(
+                "axis", "state", enabled=axis.enabled, estop=self.estop
+            )
+            names[address("axis", "faults", n)] = lambda axis=axis: axis.faults
+            names[address("axis", "first_fault", n)] = lambda axis=axis: axis.first_fault
+            names[address("axis", "velocity", n)] = lambda axis=axis: (
+                round(axis.velocity * POSITION_LSB) % WORD
+            )
+            names[address("axis", "stream_state", n)] = lambda axis=axis: placed(
+                "axis",
+                "stream_state",
+                mode=axis.mode,
+                ended=axis.ended,
+                extrapolated=axis.extrapolated,
+            )
+            names[address("axis", "stream_counts", n)] = lambda axis=axis: placed(
+                "axis",
+                "stream_counts",
+                accepted=axis.accepted,
+                late=axis.late,
+                refused=axis.refused,
+            )
+            names[address("axis", "supervision", n)] = lambda axis=axis: placed(
+                "axis", "supervision", state=axis.state, homed=axis.homed
+            )
+
+    def read(self, at: int) -> int:
+        return self.names[at]() if at in self.names else self.words.get(at, 0)
+
+    def write(self, at: int, value: int) -> None:
+        self.words[at] = value
+        for n, axis in enumerate(self.axes):
+            if at == address("axis", "set_point_position", n) + 4:
+                axis.fresh.add("position")
+            if at == address("axis", "set_point_velocity", n):
+                axis.fresh.add("velocity")
+        if at == address("node", "set_point_commit"):
+            self._commit(value)
+
+    def _commit(self, mask: int) -> None:
+        tick = self.words[address("node", "set_point_tick")]
+        tick = self.tick + signed((tick - self.tick) % WORD, 32)
+        for n, axis in enumerate(self.axes):
+            if mask >> n & 1:
+                low = address("axis", "set_point_position", n)
+                position = signed(self.words[low] | self.words[low + 4] << 32, 64) / POSITION_LSB
+                velocity = signed(self.words[address("axis", "set_point_velocity", n)], 32)
+                axis.commit(SetPoint(tick, position, velocity / VELOCITY_LSB), self.tick)
+
+    # ---- time
+
+    def advance(self, cycles: int) -> None:
+        """The node runs."""
+        end = self.time + cycles
+        while (self.tick + 1) * TICK <= end:
+            self.tick += 1
+            self.time = self.tick * TICK
+            if self.time % FIRMWARE_CYCLES == 0:
+                requests = self.words.get(address("node", "axis_requests"), 0)
+                for n, axis in enumerate(self.axes):
+                    axis.obey(self._asked(requests, n), self.tick)
+            if self.expired:
+                for axis in [axis for axis in self.axes if axis.enabled]:
+                    axis.fault("bus_watchdog")
+            for axis in self.axes:
+                axis.run(self.tick)
+            self.path.append((self.time / CLK_HZ, *(axis.position for axis in self.axes)))
+        self.time = end
+
+    def _asked(self, requests: int, n: int) -> dict[str, int]:
+        return {
+            name: requests >> field_of("node", "axis_requests", name).low >> n & 1
+            for name in ("enable", "home", "stream", "reset_faults")
+        }
+
+    def press_estop(self, pressed: bool = True) -> None:
+        """The emergency stop of the node."""
+        self.estop, self.pressed_at = pressed, self.time
+        for axis in self.axes if pressed else []:
+            axis.fault("estop")
+
+    @property
+    def expired(self) -> bool:
+        """Whether the watchdog of the link has expired."""
+        return self.time - self.heard_at > WATCHDOG_S * CLK_HZ
+
+    def stopped_for(self, seconds: float) -> bool:
+        """Whether the emergency stop has been pressed for so long."""
+        return self.estop and self.time - self.pressed_at > seconds * CLK_HZ
+
+    def unset_for(self, seconds: float) -> bool:
+        """Whether the node has been without a set-up for so long since its power came."""
+        return not self.session and self.time > seconds * CLK_HZ
+
+    # ---- the link
+
+    def answer(self, packet: bytes) -> bytes | None:
+        """The reply to a request; None if it is refused."""
+        words = struct.unpack(f"<{len(packet) // 4}I", packet) if len(packet) % 4 == 0 else ()
+        if not words or zlib.crc32(packet[:-4]) != words[-1]:
+            return self._refuse("damaged")
+        if not self.session or words[0] != layout.KIND_REQUEST | self.session << 8:
+            return self._refuse("foreign")
+        if len(words) != layout.REQUEST_WORDS + self.writes + layout.REQUEST_END_WORDS + 1:
+            return self._refuse("wrong_length")
+        if not 0 < (words[1] - self.sequence) % WORD < WORD // 2:
+            return self._refuse("replayed")
+        self.sequence, self.heard_at = words[1], self.time
+        identity = layout.KIND_REPLY | self.session << 8
+        for n, value in enumerate(words[layout.REQUEST_WORDS : layout.REQUEST_WORDS + self.writes]):
+            self.write(self.lists[n] & 0xFFFF, value)
+        values = [self.read(self.lists[n] >> 16) for n in range(self.reads)]
+        spare, spare_value = words[-3], words[-2]
+        read = 0 if spare >> 31 else self.read(spare & 0xFFFF)
+        if spare >> 31:
+            self.write(spare & 0xFFFF, spare_value)
+        counts = sum((count % 256) << 8 * n for n, count in enumerate(self.refused))
+        content = [identity, words[1], self.time % WORD, counts % WORD, counts >> 32, *values, read]
+        body = struct.pack(f"<{len(content)}I", *content)
+        return body + zlib.crc32(body).to_bytes(4, "little")
+
+    def restart(self) -> None:
+        """The node loses its power and starts again."""
+        self.session = self.sequence = self.time = self.tick = self.heard_at = 0
+        self.words = {}
+        self.refused = [0] * len(layout.CAUSES)
+        for axis in self.axes:
+            axis.__init__(position=axis.position)
+
+    def _refuse(self, cause: str) -> None:
+        names = [name for name, _ in layout.CAUSES]
+        self.refused[names.index(cause)] += 1
+
+    def write_named(self, name: str, **fields: int) -> None:
+        """Writes a register as a client of the bus would: those of the link are the set-up."""
+        if name == "link.lists":
+            self.writes, self.reads = fields["writes"], fields["reads"]
+        elif name == "link.entry":
+            self.lists[self.entry] = fields["write"] | fields["read"] << 16
+        elif name == "link.entry_number":
+            self.entry = fields["value"]
+        elif name == "link.session":
+            self.drawn = fields["value"]
+        elif name == "link.enable":
+            self.session, self.sequence = self.drawn * fields["value"], 0
+            self.heard_at = self.time
+
+    def read_named(self, name: str) -> dict[str, int]:
+        """Reads a register as a client of the bus would."""
+        if name == "node.build":
+            return {"axes": len(self.axes)}
+        assert name == "link.state"
+        on = self.session != 0
+        return {"built": 1, "on": on, "expired": on and self.expired, "session": self.session}
+
+
+class Served(threading.Thread):
+    """A node behind a UDP socket of this machine, in lockstep: each request is a period of it.
+
+    `events` are conditions with what happens once at the first request at which they are true. A
+    packet is lost, either way, where `lose(node)` is true: then one byte is the answer.
+    """
+
+    def __init__(
+        self,
+        node: IdealNode,
+        events: Sequence[tuple[Callable[[IdealNode], bool], Callable[[IdealNode], None]]] = (),
+        lose: Callable[[IdealNode], bool] = lambda node: False,
+    ) -> None:
+        super().__init__(daemon=True)
+        self.node, self.events, self.lose = node, list(events), lose
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.settimeout(0.1)
+        self.port = self.socket.getsockname()[1]
+        self.ended = threading.Event()
+
+    def run(self) -> None:
+        while not self.ended.is_set():
+            try:
+                packet, host = self.socket.recvfrom(4096)
+            except TimeoutError:
+                continue
+            for event in [event for event in self.events if event[0](self.node)]:
+                self.events.remove(event)
+                event[1](self.node)
+            reply = None if self.lose(self.node) else self.node.answer(packet)
+            self.node.advance(PERIOD_CYCLES)
+            self.socket.sendto(reply or LOST, host)
+
+    def __enter__(self) -> "Served":
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.ended.set()
+        self.join()
+        self.socket.close()
