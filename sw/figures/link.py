@@ -29,11 +29,17 @@ SHARE = 10**5  # of one run, each with a seed of its own
 
 
 CLK_HZ = 60_000_000
+NODE = {"FILTERS": 0, "HAS_SINE": 0, "HAS_LINK": 1}
 USB_CYCLES, RS485_CYCLES = 5, 20  # of a bit: 12 and 3 Mbaud
 AXES = 8
 DATA = ProcessData(
-    writes=["axis.open_command", "axis.control", "node.start_axes"],
-    reads=["axis.position", "axis.velocity", "axis.faults"],
+    writes=[
+        "axis.set_point_position",
+        "axis.set_point_velocity",
+        "node.set_point_tick",
+        "node.set_point_commit",
+    ],
+    reads=["axis.position", "axis.faults"],
 )
 TURNAROUND = 2  # bits from a reply to the next request
 BUS_BAUD = 1_000_000
@@ -50,7 +56,7 @@ def cycle_times(bit_cycles: int, cycles: int, axes: int, seed: int) -> tuple[flo
         [Node(1, [Axis("stepper_stage")] * axes)],
         seed=seed,
         clk_hz=CLK_HZ,
-        node_parameters={**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0, "HAS_LINK": 1},
+        node_parameters={**drives("HAS_STEPPER"), **NODE},
     ) as twin:
         bus = Bus(TwinTransport(twin))
         twin.run_until_ready()
@@ -148,7 +154,8 @@ FIGURES = {
         link_serial_us,
         "us",
         "packet in to packet out: time of a cycle without that of the bytes on the line, 8 axes "
-        "(17 words written, 32 read) at 60 MHz, the longest of 20 cycles of a simulated node",
+        "(a set-point of 26 words written, 24 words read) at 60 MHz, the longest of 20 cycles of a "
+        "simulated node",
         "<= 20",
         SHORT,
         0,

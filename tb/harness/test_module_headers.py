@@ -106,7 +106,6 @@ STAND_ALONE = {  # instantiated by no other module, and the reason why they exis
     "encoder_counter": "a product: a counter on the bus of another design",
     "wishbone_port": "a product: the registers on the bus of another design",
     "axi_lite_port": "a product: the registers on the bus of another design",
-    "set_point_piece": "a product: streams in hardware for another design",
     "arctan_pipelined": "the arctan without multipliers; narrow samples are correctly rounded",
     "arctan_iterative": "the small alternative to arctan_pipelined",
     "arctan_table": "the method of S0",
