@@ -81,9 +81,7 @@ def between(a: SetPoint, b: SetPoint, tick: float) -> float:
     u = (tick - a.tick) / ticks
     h00, h10 = (1 + 2 * u) * (1 - u) ** 2, u * (1 - u) ** 2
     h01, h11 = u * u * (3 - 2 * u), u * u * (u - 1)
-    return (
-        h00 * a.position + h01 * b.position + ticks * (h10 * a.velocity + h11 * b.velocity)
-    )
+    return h00 * a.position + h01 * b.position + ticks * (h10 * a.velocity + h11 * b.velocity)
 
 
 @dataclass
@@ -223,8 +221,8 @@ class IdealNode:
             )
             names[address("axis", "faults", n)] = lambda axis=axis: axis.faults
             names[address("axis", "first_fault", n)] = lambda axis=axis: axis.first_fault
-            names[address("axis", "velocity", n)] = (
-                lambda axis=axis: round(axis.velocity * POSITION_LSB) % WORD
+            names[address("axis", "velocity", n)] = lambda axis=axis: (
+                round(axis.velocity * POSITION_LSB) % WORD
             )
             names[address("axis", "stream_state", n)] = lambda axis=axis: placed(
                 "axis",

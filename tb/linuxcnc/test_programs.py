@@ -174,4 +174,6 @@ def test_a_serial_port_of_another_program_is_refused_in_a_sentence(tmp_path):
     ran = headless.run(replace(load("mill"), node=port), tmp_path, [["on"]])
     os.close(master)
     os.close(slave)
-    assert ran.exit_code != 0 and f"moire: {port}: another program uses the serial port" in ran.printed
+    assert (
+        ran.exit_code != 0 and f"moire: {port}: another program uses the serial port" in ran.printed
+    )

@@ -501,9 +501,7 @@ class Twin:
         if self.check_node(node) not in self.links:
             lines = (ctypes.c_void_p * 2)()
             baud = self.clk_hz / LINK_BIT_CYCLES
-            self.library.twin_join_link(
-                self.handle, node, self.seed, baud, ctypes.addressof(lines)
-            )
+            self.library.twin_join_link(self.handle, node, self.seed, baud, ctypes.addressof(lines))
             ends = [PeerLineHandle(self.library, int(line or 0), self.now) for line in lines]
             self.links[node] = LinkLine(self, *ends)
         return self.links[node]
