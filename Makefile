@@ -157,6 +157,12 @@ ngspice:          ## ngspice by apt-get, for `make spice`; docs/front_ends.md
 		apt-get -qy install --no-install-recommends ngspice; } > build/ngspice.log 2>&1 < /dev/null \
 		|| { echo "apt-get could not install ngspice, see build/ngspice.log: install it and run this again" >&2; false; }
 
+linuxcnc:         ## LinuxCNC by apt-get, for the driver in sw/linuxcnc and its tests; docs/linuxcnc.md
+	@command -v linuxcnc > /dev/null && command -v halcompile > /dev/null && [ -e /usr/include/zlib.h ] || { mkdir -p build; \
+		{ $(AS_ROOT) apt-get -q update && $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
+		apt-get -qy install --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev zlib1g-dev; } > build/linuxcnc.log 2>&1 < /dev/null \
+		|| { echo "apt-get could not install linuxcnc-uspace, linuxcnc-uspace-dev and zlib1g-dev, see build/linuxcnc.log: install them and run this again" >&2; false; }; }
+
 spice: $(SETUP) ngspice   ## the 1 Vpp front end checked with ngspice; its numbers for the twin; docs/front_ends.md
 	@$(PYTHON) -m boards.spice
 

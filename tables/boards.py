@@ -65,6 +65,7 @@ def machine_row(one: Machine) -> list[str]:
         f"[`{one.name}`]({link(one.file)})",
         one.title,
         "none" if one.orders else f"{len(one.axes)}: {'; '.join(kinds)}",
+        ", ".join(one.peripherals) or "none",
         "none" if one.orders else firmware,
     ]
 
@@ -87,7 +88,10 @@ def make() -> dict[Path, str]:
             "board, what it is, part, clock of the node, pins, levels, bus",
             [board_row(one) for one in boards],
         ),
-        *table("machine, what it is, axes, firmware", [machine_row(one) for one in machines]),
+        *table(
+            "machine, what it is, axes, peripherals, firmware",
+            [machine_row(one) for one in machines],
+        ),
         *table(
             "command, LUT or logic cells by estimate, block RAMs by estimate, signals",
             [design_row(one) for one in designs],

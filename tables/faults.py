@@ -17,8 +17,10 @@ HEAD = """\
 edit. -->
 # Faults and causes
 
-A *fault* is latched by the interlock and switches the drive off. A *cause* says why a node refuses a request, or how a motion ended.
-`moire fault` shows the faults of an axis, `moire fault NAME` explains one of these names, and the live page and HTTP show the same words.
+A *fault* is latched by the interlock and switches the drive off. A *cause* says why a node \
+refuses a request, or how a motion ended.
+`moire fault` shows the faults of an axis, `moire fault NAME` explains one of these names, and \
+the live page and HTTP show the same words.
 What is wrong with sine and cosine is on a [page of its own](signal_faults.md).
 """
 TITLES = {

@@ -15,6 +15,7 @@ from tables.made_files import ROOT
 
 SOURCE = ROOT / "tables" / "linuxcnc.toml"
 FOLDER = ROOT / "sw" / "linuxcnc" / "made"
+LISTS = ROOT / "sw" / "linuxcnc_config" / "lists.py"
 PAGE = ROOT / "docs" / "linuxcnc.md"
 REGISTERS = ROOT / "sw" / "firmware" / "made" / "registers.h"
 TYPES = {"bit": "HAL_BIT", "float": "HAL_FLOAT", "s32": "HAL_S32", "u32": "HAL_U32"}
@@ -60,6 +61,48 @@ def registers_header() -> str:
     return header("registers", "registers.rdl", [*lines, "", field])
 
 
+def width(name: str) -> int:
+    """Words of a register."""
+    block, _, register = name.partition(".")
+    found = next(one for one in registers.read() if one.name == block)
+    return 2 if next(r for r in found.registers if r.name == register).wide else 1
+
+
+def lists_header(table: Table) -> str:
+    """Where the words of each register are in the lists: after `fixed` words, and `each` words for
+    each axis of the node.
+    """
+    lines = ["struct list_place {", "    unsigned fixed, each, width;", "};", ""]
+    for name, names in table["list"].items():
+        fixed = each = 0
+        for register in names:
+            words = width(register)
+            place = f"{{.fixed = {fixed}, .each = {each}, .width = {words}}}"
+            lines.append(
+                f"static const struct list_place {name[:-1].upper()}_"
+                f"{register.replace('.', '_').upper()} = {place};"
+            )
+            if register.startswith("axis."):
+                each += words
+            else:
+                fixed += words
+        lines += [f"enum {{ {name.upper()}_FIXED = {fixed}, {name.upper()}_EACH = {each} }};", ""]
+    return header("lists", "linuxcnc.toml", lines[:-1])
+
+
+def lists_table(table: Table) -> str:
+    """The lists for the set-up."""
+    lines = [
+        "# SPDX-License-Identifier: Apache-2.0",
+        '"""Made by tables/linuxcnc.py from linuxcnc.toml: do not edit."""',
+        "",
+        "# the registers that each packet carries, in their order",
+    ]
+    for name, names in table["list"].items():
+        lines += [f"{name.upper()} = (", *(f'    "{register}",' for register in names), ")"]
+    return "\n".join(lines) + "\n"
+
+
 def texts(name: str, rows: dict[int, str]) -> list[str]:
     """A C array of texts by number."""
     made = [f"static const char* const {name}[] = {{"]
@@ -88,7 +131,9 @@ def identifier(pin: str) -> str:
     return re.sub(r"\W", "_", pin)
 
 
-def pins_header(table: Table, found: dict[int, tuple[str, str]], states: dict[int, tuple[str, str]]) -> str:
+def pins_header(
+    table: Table, found: dict[int, tuple[str, str]], states: dict[int, tuple[str, str]]
+) -> str:
     """Structures of the pins, the tables by which they are exported, causes and states."""
     lines: list[str] = []
     for scope in SCOPES:
@@ -156,6 +201,8 @@ def made() -> dict[Path, str]:
     return {
         FOLDER / "packet_layout.h": packet_header(),
         FOLDER / "registers.h": registers_header(),
+        FOLDER / "lists.h": lists_header(table),
+        LISTS: lists_table(table),
         FOLDER / "pins.h": pins_header(table, found, by_number(words["state"])),
         PAGE: page(table, found),
     }

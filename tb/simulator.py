@@ -188,14 +188,19 @@ def quiet(sim):
 
 def of_mutants(request, source, parameters, name):
     """(source, environment) of the simulation of a block with its mutants, by a request of
-    mutation.blocks, which finds the verdicts by the name of the test; a test of another module is
-    skipped. A mutant that another test of the same build has found is not run again.
+    mutation.blocks, which finds the verdicts by the name of the test. A test of another module is
+    skipped, and so is one whose build has itself left all faults that are asked for. A mutant that
+    another test of the same build has found is not run again.
     """
     file = Path(request)
     asked = json.loads(file.read_text())
     if source.stem != asked["block"]:
         pytest.skip(f"there are mutants of {asked['block']} only")
-    folder = block.prepared(source, parameters, rtl_path(), asked["count"], asked["seed"])
+    faults = [tuple(fault) for fault, build in asked["faults"] if build != parameters]
+    if asked["faults"] and not faults:
+        pytest.skip("the faults were left by this build")
+    choice = asked["count"], asked["seed"], faults
+    folder = block.prepared(source, parameters, rtl_path(), *choice)
     found = block.Run.found(file.parent, folder)
     numbers = [m.number for m in block.mutants_of(folder) if m.number not in found]
     block.Run(str(folder), parameters, numbers).write(file.parent / f"{name}.json")

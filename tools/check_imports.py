@@ -2,8 +2,8 @@
 """Cycles among modules, and imports that go round the package system.
 
 - Python: the modules of moire, twin, boards, campaigns, code_coverage, embed, experiments, figures,
-  fuzz, firmware, linuxcnc_config, mutation, study, tables, tools and tb import each other without a cycle, deferred
-  imports included;
+  fuzz, firmware, linuxcnc_config, mutation, study, tables, tools and tb import each other without a
+  cycle, deferred imports included;
 - nothing outside tb imports from tb, and moire imports none of the others;
 - nothing patches sys.path or loads a file by an import spec;
 - C and C++: a module is x.c with x.h; modules include each other without a cycle;
@@ -34,7 +34,7 @@ PACKAGES = {
     "figures": "sw/figures",
     "firmware": "sw/firmware",
     "fuzz": "sw/fuzz",
-    "linuxcnc_config": "sw/linuxcnc/config",
+    "linuxcnc_config": "sw/linuxcnc_config",
     "mutation": "sw/mutation",
     "study": "sw/study",
     "tables": "tables",

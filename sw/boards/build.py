@@ -137,6 +137,13 @@ def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float
     return placed(netlist, by.nextpnr, chip(design), mhz, seed, *pinned(design, folder), *written)
 
 
+def counted(design: Design, folder: Path, netlist: Path) -> dict[str, Any]:
+    """The utilization of the part after packing, without a placement: {cell: {used, available}}."""
+    by, mhz = placer(design), design.board.node_hz / 1e6
+    more = (*pinned(design, folder), "--pack-only")
+    return placed(netlist, by.nextpnr, chip(design), mhz, 1, *more)[1]
+
+
 def program_of(design: Design, folder: Path) -> Path:
     """The file of the firmware that a bitstream is made with: its bytes for the flash of a serial
     core, else words for the block RAMs.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from boards import clocks, size
 from boards.board import FLASH, Board, Pad
-from boards.machine import DRIVES, FEATURES, Between, Machine, Signal, Wiring
+from boards.machine import DRIVES, FEATURES, PERIPHERALS, Between, Machine, Signal, Wiring
 from boards.toml_file import Misfit, TooLarge
 
 TICK_HZ = 4000  # servo tick that the firmware sets
@@ -83,6 +83,7 @@ def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
         "HAS_DRIVE": mask(machine, "drive"),
         **{name: mask(machine, drive) for drive, name in DRIVES.items()},
         **{name: mask(machine, feature) for feature, (name, _) in FEATURES.items()},
+        **{name: int(each in machine.peripherals) for each, name in PERIPHERALS.items()},
         "HAS_SERIAL_CORE": int(machine.core == "serial"),
         "MEMORY_BYTES": 1024 * machine.memory_kib,
         "PROGRAM_BYTES": 32768,
@@ -126,7 +127,7 @@ def pad_of(board: Board, file: str, name: str, place: str, turned: list[str]) ->
 def check_direction(board: Board, machine: Machine, one: Connection) -> None:
     """Refuses an output on a pin for inputs only, and an input on one for outputs only."""
     if one.pad.direction not in ("both", one.signal.direction):
-        words = {"in": "input", "out": "output"}
+        words = {"in": "input", "out": "output", "both": "input and output"}
         behind = f" behind its buffer ({one.pad.through})" if one.pad.through else ""
         raise Misfit(
             f"{machine.file}: {one.name} is an {words[one.signal.direction]}, but {one.pad.place} "
@@ -148,7 +149,7 @@ def check_volts(board: Board, machine: Machine, one: Connection) -> None:
     part behind it takes.
     """
     levels, pin = one.between.volts, one.pad.volts
-    if one.signal.direction == "in" and max(levels) > pin:
+    if one.signal.direction != "out" and max(levels) > pin:
         raise Misfit(
             f"{machine.file}: {one.name} comes with {max(levels):g} V, but {one.pad.place} of "
             f"{board.file} takes {pin:g} V at most"

@@ -12,7 +12,8 @@ from markupsafe import Markup
 from boards import block_ram
 from boards.board import FLASH, LEDS, Pad
 from boards.fit import PLACEHOLDER, Connection, Design
-from boards.machine import AXIS_SIGNALS, RELAY_SIGNALS
+from boards.machine import AXIS_SIGNALS, NODE_SIGNALS, PERIPHERALS, RELAY_SIGNALS
+from moire.analysis.loopback import GROUND, PLUG
 
 TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).with_name("templates")),
@@ -33,11 +34,7 @@ RELAY_OUTPUTS = (
     *("flash_chip_n", "flash_sclk", "flash_sdo"),
 )
 RELAY_FLASH = {"flash_cs_n": "flash_chip_n", "flash_sclk": "flash_sclk", "flash_mosi": "flash_sdo"}
-PERIPHERAL_INPUTS = {  # at the levels at which nothing happens
-    **dict.fromkeys(("i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data"), "1'b1"),
-    **dict.fromkeys(("edm_clock", "edm_data", "peer_rx", "sensor_rx", "link_rx"), "1'b1"),
-    "edm_status": "2'b00",
-}
+EDM_STATUS = ("edm_alarm", "edm_cutting")  # the bits of edm_status, the highest first
 FRONT_ENDS = "../../../docs/front_ends.md"  # from the folder of a wiring page
 ROW, HEAD, PARTS_LEFT, LETTER = 26, 30, 420, 8  # of the drawing, in its units
 
@@ -53,7 +50,8 @@ class Pin:
 
     @property
     def declared(self) -> str:
-        return f"{'input  wire ' if self.direction == 'in' else 'output logic'} {self.port}"
+        words = {"in": "input  wire ", "out": "output logic", "both": "inout  wire "}
+        return f"{words[self.direction]} {self.port}"
 
 
 def has_usb(design: Design) -> bool:
@@ -123,7 +121,12 @@ def inputs(design: Design) -> dict[str, str]:
         },
         "probe": bits("probe_1", "probe_0"),
         "flash_miso": "flash_miso" if design.machine.has_flash else "1'b0",
-        **PERIPHERAL_INPUTS,
+        **{
+            name: ports.get(name, f"1'b{signal.idle}")
+            for name, signal in NODE_SIGNALS.items()
+            if signal.needs in PERIPHERALS and signal.direction != "out" and name not in EDM_STATUS
+        },
+        "edm_status": "{" + ", ".join(ports.get(name, "1'b0") for name in EDM_STATUS) + "}",
     }
 
 
@@ -161,6 +164,8 @@ def assigned(design: Design) -> dict[str, str]:
             axis, _, name = one.name.rpartition(".")
             index = f"[{number[axis]}]" if axis and len(number) > 1 else ""
             found[one.port] = f"node_{name}{index}"
+        elif one.signal.direction == "both":
+            found[one.port] = f"node_{one.name}_low ? 1'b0 : 1'bz"
     return found
 
 
@@ -171,7 +176,7 @@ def literal(value: int | str) -> str:
 
 def level(one: Connection) -> float:
     """Volts at a pin while it is high."""
-    return max(one.between.volts) if one.signal.direction == "in" else one.pad.volts
+    return one.pad.volts if one.signal.direction == "out" else max(one.between.volts)
 
 
 def boxes(design: Design) -> list[dict[str, Any]]:
@@ -186,7 +191,10 @@ def boxes(design: Design) -> list[dict[str, Any]]:
             if one is None:
                 continue
             y = top + HEAD + ROW * len(rows) + 8
-            left, right = (150, 141) if one.signal.direction == "in" else (411, 420)
+            left, right = (411, 420) if one.signal.direction == "out" else (150, 141)
+            arrow = f"M{right} {y} L{left} {y - 5} L{left} {y + 5} Z"
+            if one.signal.direction == "both":
+                arrow += f" M420 {y} L411 {y - 5} L411 {y + 5} Z"
             rows.append(
                 {
                     "pin": pin,
@@ -196,7 +204,7 @@ def boxes(design: Design) -> list[dict[str, Any]]:
                     "volts": level(one),
                     "part": one.between.part,
                     "y": y,
-                    "arrow": f"M{right} {y} L{left} {y - 5} L{left} {y + 5} Z",
+                    "arrow": arrow,
                 }
             )
         if rows:
@@ -227,6 +235,19 @@ def unconnected(design: Design) -> list[str]:
     return [*machine.unused, *machine.wiring[design.board.layout].unused, *of_axes]
 
 
+def plug(design: Design) -> list[tuple[str, str]]:
+    """(from, to) of the wires of the loop-back plug, at pins of the board; none without drives."""
+    places = {one.name: one.pad.place for one in design.connections}
+    found = [(GROUND, places["estop_open"])] if "estop_open" in places else []
+    for axis in design.machine.axes:
+        for name, source in PLUG.items():
+            start = source if source == GROUND else places.get(f"{axis.name}.{source}")
+            end = places.get(f"{axis.name}.{name}")
+            if axis.drives and start and end:
+                found.append((start, end))
+    return found
+
+
 def page(design: Design) -> str:
     """The wiring page."""
     return TEMPLATES.get_template("wiring.html.jinja").render(
@@ -234,6 +255,7 @@ def page(design: Design) -> str:
         svg=Markup(svg(design)),
         connections=design.connections,
         unconnected=unconnected(design),
+        plug=plug(design),
         front_ends=FRONT_ENDS,
         level=level,
     )

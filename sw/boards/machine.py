@@ -20,14 +20,23 @@ FOLDER = ROOT / "constraints" / "machines"
 class Signal:
     """A signal of an axis or of the node at a pin."""
 
-    direction: str  # in or out, of the FPGA
+    direction: str  # in or out, of the FPGA; both: it only pulls low
     group: str  # signals of one group go through the same part, [between.GROUP]
     meaning: str
     idle: int = 0  # level of an input that is not connected
-    needs: str = ""  # drive or feature of the axis; empty: every axis has it
+    needs: str = ""  # drive or feature of the axis, or peripheral; empty: it is always there
 
 
 DRIVES = {"bridge": "HAS_BRIDGE", "stepper": "HAS_STEPPER", "dac": "HAS_DAC"}
+PERIPHERALS = {  # of a node: its parameter of rtl/node.sv
+    "i2c": "HAS_I2C",
+    "ps2": "HAS_PS2",
+    "peer": "HAS_PEER",
+    "angle_sensor": "HAS_ANGLE_SENSOR",
+    "display": "HAS_DISPLAY",
+    "status_inputs": "HAS_STATUS_INPUTS",
+    "link": "HAS_LINK",
+}
 FEATURES = {  # of an axis: its parameter of rtl/node.sv, and the feature that it needs
     "sine": ("HAS_SINE", ""),
     "own_chain": ("HAS_OWN_CHAIN", "sine"),
@@ -70,6 +79,23 @@ NODE_SIGNALS = {
     "rs485_tx": Signal("out", "rs485", "driver of the bus, idles high"),
     "rs485_driver_enable": Signal("out", "rs485", "1: drive the bus"),
     "estop_open": Signal("in", "estop", "1: emergency stop pressed or wire cut", needs="drive"),
+    "link_rx": Signal("in", "link", "line of the real-time link, idles high", 1, "link"),
+    "link_tx": Signal("out", "link", "line of the real-time link, idles high", needs="link"),
+    "link_driver_enable": Signal("out", "link", "1: drive the line", needs="link"),
+    "i2c_scl": Signal("both", "i2c", "clock of the I2C bus", 1, "i2c"),
+    "i2c_sda": Signal("both", "i2c", "data of the I2C bus", 1, "i2c"),
+    "keyboard_clock": Signal("both", "keyboard", "clock of the keyboard", 1, "ps2"),
+    "keyboard_data": Signal("both", "keyboard", "data of the keyboard", 1, "ps2"),
+    "edm_clock": Signal("both", "edm", "clock to the PC that has the keyboard", 1, "ps2"),
+    "edm_data": Signal("both", "edm", "data to the PC that has the keyboard", 1, "ps2"),
+    "peer_rx": Signal("in", "peer", "from the other controller, idles high", 1, "peer"),
+    "peer_tx": Signal("out", "peer", "to the other controller, idles high", needs="peer"),
+    "sensor_rx": Signal("in", "sensor", "frames of the angle, idles high", 1, "angle_sensor"),
+    "display_cs_n": Signal("out", "display", "low during a word", needs="display"),
+    "display_sclk": Signal("out", "display", "clock of the display, idles low", needs="display"),
+    "display_data": Signal("out", "display", "data of the display", needs="display"),
+    "edm_cutting": Signal("in", "edm_status", "1: the machine cuts", needs="status_inputs"),
+    "edm_alarm": Signal("in", "edm_status", "1: the machine needs somebody", needs="status_inputs"),
 }
 RELAY_SIGNALS = {
     **{name: AXIS_SIGNALS[name] for name in ("encoder_a", "encoder_b", "encoder_z")},
@@ -142,6 +168,7 @@ class Machine:
     filters: int
     segments: int
     axes: list[Axis]
+    peripherals: list[str]
     unused: list[str]  # signals of the node that are not connected
     wiring: dict[str, Wiring]  # by layout
 
@@ -165,11 +192,11 @@ class Machine:
         """{name: signal} of all its signals that are to be connected."""
         if self.orders:
             return {n: signal for n, signal in RELAY_SIGNALS.items() if n not in self.unused}
-        drives = any(axis.drives for axis in self.axes)
+        present = ["", *self.peripherals, *["drive"] * any(axis.drives for axis in self.axes)]
         found = {
             name: signal
             for name, signal in NODE_SIGNALS.items()
-            if name not in self.unused and (drives or not signal.needs)
+            if name not in self.unused and signal.needs in present
         }
         for axis in self.axes:
             found |= {
@@ -316,6 +343,7 @@ def load(path: Path) -> Machine:
         filters=0 if is_relay else kind.take("filters", int, 0),
         segments=0 if is_relay else kind.take("segments", int, 0),
         axes=[axis_of(row) for row in table.rows("axis")],
+        peripherals=[] if is_relay else kind.chosen("peripherals", PERIPHERALS),
         unused=kind.chosen("unused", RELAY_SIGNALS if is_relay else NODE_SIGNALS),
         wiring={layout: wiring_of(layouts.table(layout), between) for layout in list(layouts.left)},
     )

@@ -21,6 +21,7 @@ FEATURES = {
     "recorder": 100,
 }
 STEPPER = 730  # in an axis that has another drive
+PERIPHERALS = 3033  # all six (docs/peripherals.md); one alone was not measured
 # Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of ten nodes)
 MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
@@ -90,6 +91,7 @@ def estimate(family: str, machine: Machine) -> Size:
     block_ram = ecp5_block_ram(machine)
     if family == "xc7":  # twice as large
         block_ram = -(-block_ram // 2)
+    shared += PERIPHERALS * bool(machine.peripherals)
     return Size(shared + sum(map(axis_lut, axes)), block_ram)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from experiments import s0_fine, s2_stage, s3_zero, s4_job
 from experiments.s0_stage import ADDRESSES
 from moire.errors import TwinNotBuilt
-from twin import WITH_SEGMENTS, BuildError, Twin, TwinTransport
+from twin import WITH_SCOPE, BuildError, Twin, TwinTransport
 
 
 def fine_stage(seed: int) -> Twin:
@@ -23,8 +23,8 @@ def fine_stage(seed: int) -> Twin:
 
 
 def stage(seed: int, nodes: tuple[int, ...] = tuple(ADDRESSES.values())) -> Twin:
-    """The stage of S0 with its segment table; its nodes listen."""
-    twin = Twin(nodes=nodes, seed=seed, node_parameters=WITH_SEGMENTS)
+    """The stage of S0 with segment table, filters and recorder of ticks; its nodes listen."""
+    twin = Twin(nodes=nodes, seed=seed, node_parameters=WITH_SCOPE)
     twin.run_until_ready()
     return twin
 

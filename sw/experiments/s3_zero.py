@@ -113,19 +113,21 @@ class Motor:
     """The simulated machine, its node and its host."""
 
     def __init__(
-        self, seed: int = 1, settings: Mapping[str, Value] | None = None, **machine: float
+        self,
+        seed: int = 1,
+        settings: Mapping[str, Value] | None = None,
+        **machine: float,
     ) -> None:
-        self.twin = Twin(
-            [Node(1, [Axis("linear_motor", machine)])],
-            seed=seed,
-            clk_hz=CLK_HZ,
-            node_parameters=NODE,
-        )
+        self.twin = self.twin_of([Node(1, [Axis("linear_motor", machine)])], seed)
         self.bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed), poll_s=POLL_S)
         self.twin.run_until_ready()
         self.axis = self.bus.axis(1)
         for name, value in {**SETTINGS, **servo(), **(settings or {})}.items():
             self.axis.set_parameter(name, value)
+
+    def twin_of(self, nodes: Sequence[Node], seed: int) -> Twin:
+        """The twin of the node: RTL."""
+        return Twin(nodes, seed=seed, clk_hz=CLK_HZ, node_parameters=NODE)
 
     @property
     def position_um(self) -> float:

@@ -1,16 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure of the boards: each machine on each board that it is wired for and fits, as `make board`
-builds it.
+"""Figures of the boards: each machine on each board that it is wired for and fits, as `make board`
+builds it, and how much of two small parts the mill takes.
 """
 
+import json
 from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
 
+from boards import board as boards
 from boards import build
-from boards.fit import Design
+from boards import machine as machines
+from boards.fit import Design, fit
 from boards.generate import files
 from boards.toml_file import Misfit
 from figures.common import Figure, Quick, console, seeds
 from figures.synthesis import PLACEMENTS, SynthesisError
+
+RESULTS = build.OUT / "results"  # of placements that are done
 
 
 def generated(design: Design, _seed: int) -> str:
@@ -20,19 +27,49 @@ def generated(design: Design, _seed: int) -> str:
     return f"{missing[0]} is missing" if missing else ""
 
 
+def once(design: Design, seed: int, measure: Callable[[], float]) -> float:
+    """What is measured of a design with a seed, or what it was before if nothing has changed that
+    the placement depends on; so the hours of the figure may be divided into sittings. A tool that
+    failed is a result, too.
+    """
+    file = RESULTS / f"{design.name}-seed{seed}-{build.state(design)[:16]}.json"
+    if not file.is_file():
+        found: dict[str, float | str] = {}
+        try:
+            found["mhz"] = measure()
+        except SynthesisError as why:
+            found["why"] = str(why)
+        RESULTS.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(found))
+    known = json.loads(file.read_text())
+    if "why" in known:
+        raise SynthesisError(known["why"])
+    return float(known["mhz"])
+
+
 def built(design: Design, seed: int) -> str:
     """Why a design has no bitstream or misses its clock at one of the seeds; empty if it is good. A
     part that no open tool places has a netlist.
     """
     build.check_tools(design)
-    folder = build.write(design)
-    build.make_firmware(design, folder)
-    netlist = build.synthesise(design, folder)
+
+    @cache
+    def netlist() -> tuple[Path, Path]:
+        folder = build.write(design)
+        build.make_firmware(design, folder)
+        return folder, build.synthesise(design, folder)
+
+    def placed(one: int) -> float:
+        folder, made = netlist()
+        mhz = build.place(design, folder, made, one)[0]
+        build.pack(design, folder)
+        return mhz
+
     if design.board.part.family.placer is None:
+        netlist()
         return ""
     needed = design.board.node_hz / 1e6
-    tries = [build.place(design, folder, netlist, one)[0] for one in seeds(seed, PLACEMENTS)]
-    build.pack(design, folder)
+    tries = [once(design, one, partial(placed, one)) for one in seeds(seed, PLACEMENTS)]
     console.print(f"{design.name}: {', '.join(f'{mhz:.1f}' for mhz in tries)} MHz")
     return f"{min(tries):.1f} MHz, {needed:g} are needed" if min(tries) < needed else ""
 
@@ -53,7 +90,39 @@ def boards_failed(places: bool = True, seed: int = 1) -> float:
     return float(failed)
 
 
+def mill_pct(board: str, packs: bool = True) -> float:
+    """Share of the LUT of a board's part that the mill takes, in percent: after packing, or by the
+    estimate of `make board`.
+    """
+    design = fit(boards.named(board), machines.named("mill"))
+    used, available = design.estimate.lut, design.board.part.lut
+    if packs:
+        build.check_tools(design)
+        folder = build.write(design)
+        build.make_firmware(design, folder)
+        found = build.counted(design, folder, build.synthesise(design, folder))
+        console.print(f"{design.name}: {build.used(design, found)}")
+        cell = found[build.placer(design).used["LUT"]]
+        used, available = cell["used"], cell["available"]
+    return 100 * used / available
+
+
+def mill(board: str, words: str, bound: str) -> Figure:
+    """The figure of the mill on a board."""
+    return Figure(
+        partial(mill_pct, board),
+        "%",
+        f"share of the LUT of {words} that the three-axis mill takes (steppers, A/B/Z scales with "
+        "index, homing, limits, firmware in block RAM), after packing by nextpnr, nothing placed",
+        bound,
+        Quick({"packs": False}, "the estimate of make board, no synthesis"),
+        1,
+    )
+
+
 FIGURES = {
+    "board_mill_i5_pct": mill("colorlight_i5", "a Colorlight i5 (LFE5U-25F)", "<= 50"),
+    "board_mill_tang_pct": mill("tang_nano_20k", "a Tang Nano 20K (GW2AR-18)", "<= 70"),
     "boards_failed": Figure(
         boards_failed,
         "builds",

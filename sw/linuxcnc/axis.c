@@ -17,9 +17,7 @@ static const unsigned WARM_UP = 3;           // periods until the commands are t
 enum { MODE_OFF, MODE_PREPARED, MODE_STREAMING, MODE_EXTRAPOLATING, MODE_ENDED };
 enum { ENDED_LATE = 3, ENDED_FAULT = 4 };
 
-static int64_t wide(uint32_t low, uint32_t high) {
-    return (int64_t)((uint64_t)high << 32 | low);
-}
+static int64_t wide(uint32_t low, uint32_t high) { return (int64_t)((uint64_t)high << 32 | low); }
 
 static double scale_of(const struct axis* axis) {
     double scale = *axis->pins.scale;
@@ -37,28 +35,35 @@ static void fail(struct axis* axis, uint32_t cause) {
     *axis->pins.fault_cause = cause;
 }
 
-void axis_take(struct axis* axis, const uint32_t* words, double tick_s) {
+void axis_take(struct axis* axis, const uint32_t* words, unsigned axes, unsigned number,
+               double tick_s) {
     struct axis_pins* pins = &axis->pins;
     double scale = scale_of(axis);
-    int64_t position = wide(words[READ_POSITION_LOW], words[READ_POSITION_HIGH]);
-    int64_t target = wide(words[READ_TARGET_LOW], words[READ_TARGET_HIGH]);
-    uint32_t state = words[READ_STATE], stream = words[READ_STREAM_STATE];
-    uint32_t counts = words[READ_STREAM_COUNTS];
-    axis->faults = words[READ_FAULTS];
-    axis->first_fault = words[READ_FIRST_FAULT];
+    const uint32_t* at_position = words + list_word(READ_AXIS_POSITION, axes, number);
+    const uint32_t* at_target = words + list_word(READ_AXIS_TARGET, axes, number);
+    int64_t position = wide(at_position[0], at_position[1]);
+    int64_t target = wide(at_target[0], at_target[1]);
+    uint32_t state = words[list_word(READ_AXIS_STATE, axes, number)];
+    uint32_t stream = words[list_word(READ_AXIS_STREAM_STATE, axes, number)];
+    uint32_t counts = words[list_word(READ_AXIS_STREAM_COUNTS, axes, number)];
+    uint32_t supervision = words[list_word(READ_AXIS_SUPERVISION, axes, number)];
+    int32_t velocity = (int32_t)words[list_word(READ_AXIS_VELOCITY, axes, number)];
+    int32_t error = (int32_t)words[list_word(READ_AXIS_FOLLOWING_ERROR, axes, number)];
+    axis->faults = words[list_word(READ_AXIS_FAULTS, axes, number)];
+    axis->first_fault = words[list_word(READ_AXIS_FIRST_FAULT, axes, number)];
     axis->target = (double)target / POSITION_LSB / scale;
     axis->mode = FIELD_GET(stream, AXIS_STREAM_STATE_MODE);
     axis->ended = FIELD_GET(stream, AXIS_STREAM_STATE_ENDED);
-    axis->state = FIELD_GET(words[READ_SUPERVISION], AXIS_SUPERVISION_STATE);
+    axis->state = FIELD_GET(supervision, AXIS_SUPERVISION_STATE);
     *pins->position = (double)position / POSITION_LSB / scale;
     *pins->rawcounts = (int32_t)(position >> 14);
-    *pins->velocity_fb = (int32_t)words[READ_VELOCITY] / TICK_LSB / tick_s / scale;
-    *pins->f_error = (int32_t)words[READ_FOLLOWING_ERROR] / POSITION_LSB / scale;
+    *pins->velocity_fb = velocity / TICK_LSB / tick_s / scale;
+    *pins->f_error = error / POSITION_LSB / scale;
     *pins->enabled = FIELD_GET(state, AXIS_STATE_ENABLED);
     *pins->limit_low = FIELD_GET(state, AXIS_STATE_LIMIT_LOW);
     *pins->limit_high = FIELD_GET(state, AXIS_STATE_LIMIT_HIGH);
     *pins->saturated = FIELD_GET(state, AXIS_STATE_SATURATED);
-    *pins->homed = FIELD_GET(words[READ_SUPERVISION], AXIS_SUPERVISION_HOMED);
+    *pins->homed = FIELD_GET(supervision, AXIS_SUPERVISION_HOMED);
     *pins->streaming = axis->mode == MODE_STREAMING || axis->mode == MODE_EXTRAPOLATING;
     *pins->set_points_late = FIELD_GET(counts, AXIS_STREAM_COUNTS_LATE);
     *pins->set_points_refused = FIELD_GET(counts, AXIS_STREAM_COUNTS_REFUSED);

@@ -27,11 +27,11 @@ enum phase {
 struct axis {
     struct axis_pins pins;
     enum phase phase;
-    unsigned periods;     // since the phase began
-    bool seen;            // the node has begun to home
-    double commands[3];   // the last commanded positions, the newest one last
-    double offset;        // added to them, it falls to 0 after the start
-    double target;        // of the node, machine units
+    unsigned periods;    // since the phase began
+    bool seen;           // the node has begun to home
+    double commands[3];  // the last commanded positions, the newest one last
+    double offset;       // added to them, it falls to 0 after the start
+    double target;       // of the node, machine units
     uint32_t faults, first_fault, mode, ended, state;
 };
 
@@ -43,15 +43,16 @@ struct axis_request {
     bool commit;
 };
 
-// The words of an axis in a good reply (AXIS_READS of them) go to the pins.
-void axis_take(struct axis* axis, const uint32_t* words, double tick_s);
+// What a good reply says of axis `number` of `axes` goes to its pins.
+void axis_take(struct axis* axis, const uint32_t* words, unsigned axes, unsigned number,
+               double tick_s);
 
 // One period of the axis, after axis_take if a reply has come. `cause`: why no drive may be on; 0:
 // it may. Sets the pins that answer LinuxCNC.
 void axis_decide(struct axis* axis, uint32_t cause, double period_s);
 
-// The part of the axis in the next request. The set-point is at the commanded position of the period
-// before, `shift_s` later.
+// The part of the axis in the next request. The set-point is at the commanded position of the
+// period before, `shift_s` later.
 struct axis_request axis_give(struct axis* axis, double period_s, double tick_s, double shift_s);
 
 #endif

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // moire.c -- HAL component: nodes of Moire on a real-time link, each cycle one packet each way.
 //
-//     loadrt moire node="udp:192.168.1.121:27181" axes=3
+//     loadrt moire node="serial:/dev/ttyUSB1:3000000" axes=3 session=4711
 //     addf moire.0.read servo-thread      first
 //     addf moire.0.write servo-thread     last
 //
-// docs/linuxcnc.md describes the pins. The set-up is done while the component is loaded, outside
-// the realtime thread.
+// docs/linuxcnc.md describes the pins. Another program sets the link up before; the check of the
+// node is done while the component is loaded, outside the realtime thread.
 #include <rtapi.h>
 #include <rtapi_app.h>
 #include <rtapi_string.h>
@@ -15,7 +15,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "axis.h"
 #include "node.h"
@@ -30,6 +29,8 @@ static char* node[MOST_NODES];
 RTAPI_MP_ARRAY_STRING(node, MOST_NODES, "udp:HOST:PORT or serial:DEVICE:BAUD of each node");
 static int axes[MOST_NODES] = {1, 1, 1, 1, 1, 1, 1, 1};
 RTAPI_MP_ARRAY_INT(axes, MOST_NODES, "axes of each node");
+static int session[MOST_NODES];
+RTAPI_MP_ARRAY_INT(session, MOST_NODES, "session that each node was set up for");
 static int simulated = 0;
 RTAPI_MP_INT(simulated, "1: each packet is a servo period of a simulated node, wait for it");
 
@@ -37,7 +38,7 @@ static const int64_t NS_PER_MS = 1000000;
 static const double NS = 1e-9, MS = 1e-3;
 static const int64_t SIMULATED_NS = 60000000000;  // longest wait for a simulated node
 enum { LEVEL_LOST = 2, LEVEL_GOOD = 1, LEVEL_LIMIT = 10 };
-enum { WATCHDOG_MS = 50, WINDOW_MS = 50, LEAST_TICKS = 2 };
+enum { LEAST_TICKS = 2 };  // from one set-point to the next
 
 struct link {
     struct node node;
@@ -57,13 +58,11 @@ struct link {
 static int component;
 static struct link* links;
 
-static bool in_session(const struct link* link) { return node_ready(&link->node); }
-
 // Takes packets until the reply to the last request is there, or the time is over.
 static bool receive(struct link* link) {
     struct node_pins* pins = &link->pins;
-    int64_t wait = simulated ? SIMULATED_NS
-                             : (int64_t)(*pins->packet_read_timeout * (double)NS_PER_MS);
+    int64_t wait =
+        simulated ? SIMULATED_NS : (int64_t)(*pins->packet_read_timeout * (double)NS_PER_MS);
     int64_t deadline = carrier_now() + wait;
     size_t length;
     while ((length = carrier_receive(&link->node.carrier, link->packet, deadline))) {
@@ -88,23 +87,16 @@ static void take_reply(struct link* link) {
     struct node* of = &link->node;
     of->time = link->reply.time;
     *pins->latency = (double)(carrier_now() - of->sent_at) / (double)NS_PER_MS;
-    if (!in_session(link)) {
-        if (!node_set_up_reply(of, &link->reply)) node_begin(of);
-        return;
-    }
     count_refused(link);
     if (link->started && link->reply.expired) *pins->watchdog_has_bit = 1;
     const uint32_t* words = link->reply.values;
-    node_clock_take(&link->clock, of->time, words[READ_TICK_COUNT]);
+    node_clock_take(&link->clock, of->time, words[READ_NODE_TICK_COUNT.fixed]);
     *pins->lateness = link->clock.late / of->clk_hz / MS;
     *pins->drift = node_clock_drift(&link->clock);
-    words += NODE_READS;
-    bool estop = false;
-    for (unsigned n = 0; n < of->axes; n++, words += AXIS_READS) {
-        axis_take(&link->axis[n], words, of->tick / of->clk_hz);
-        estop |= FIELD_GET(words[READ_STATE], AXIS_STATE_ESTOP);
-    }
-    *pins->estop = estop;
+    for (unsigned n = 0; n < of->axes; n++)
+        axis_take(&link->axis[n], words, of->axes, n, of->tick / of->clk_hz);
+    uint32_t state = words[list_word(READ_AXIS_STATE, of->axes, 0)];
+    *pins->estop = FIELD_GET(state, AXIS_STATE_ESTOP);
     link->started = true;
 }
 
@@ -118,7 +110,6 @@ static void count(struct link* link, bool good) {
     *pins->packet_error_exceeded = level >= LEVEL_LIMIT;
     if (level >= LEVEL_LIMIT && !*pins->io_error) {
         *pins->io_error = 1;
-        node_begin(&link->node);  // the node may have lost its power
         rtapi_print_msg(RTAPI_MSG_ERR, "moire: %s\n", CAUSE_TEXTS[CAUSE_LINK_LOST]);
     }
 }
@@ -127,10 +118,8 @@ static void decide(struct link* link, double period_s) {
     struct node_pins* pins = &link->pins;
     if (*pins->reset && !link->was_reset) *pins->io_error = *pins->watchdog_has_bit = 0;
     link->was_reset = *pins->reset;
-    bool in_touch = in_session(link) && link->started && !*pins->io_error;
-    uint32_t cause = !in_touch                 ? CAUSE_LINK_LOST
-                     : *pins->watchdog_has_bit ? CAUSE_WATCHDOG
-                                               : 0;
+    bool in_touch = link->started && !*pins->io_error;
+    uint32_t cause = !in_touch ? CAUSE_LINK_LOST : *pins->watchdog_has_bit ? CAUSE_WATCHDOG : 0;
     uint32_t denied = cause || *pins->enable ? cause : CAUSE_NOT_ALLOWED;
     for (unsigned n = 0; n < link->node.axes; n++) {
         struct axis* axis = &link->axis[n];
@@ -164,12 +153,13 @@ static void fill(struct link* link, double period_s) {
     double moment = node_clock_tick(&link->clock, delay_s * to->clk_hz);
     double tick = floor(moment);
     double shift_s = (tick - moment) * tick_s;
-    uint32_t requests = 0, commit = 0, *word = link->values;
+    uint32_t requests = 0, commit = 0, *values = link->values;
     for (unsigned n = 0; n < to->axes; n++) {
         struct axis_request asks = axis_give(&link->axis[n], period_s, tick_s, shift_s);
-        *word++ = (uint32_t)asks.position;
-        *word++ = (uint32_t)((uint64_t)asks.position >> 32);
-        *word++ = (uint32_t)asks.velocity;
+        uint32_t* position = values + list_word(WRITE_AXIS_SET_POINT_POSITION, to->axes, n);
+        position[0] = (uint32_t)asks.position;
+        position[1] = (uint32_t)((uint64_t)asks.position >> 32);
+        values[list_word(WRITE_AXIS_SET_POINT_VELOCITY, to->axes, n)] = (uint32_t)asks.velocity;
         requests |= ((uint32_t)asks.enable << NODE_AXIS_REQUESTS_ENABLE_SHIFT |
                      (uint32_t)asks.home << NODE_AXIS_REQUESTS_HOME_SHIFT |
                      (uint32_t)asks.stream << NODE_AXIS_REQUESTS_STREAM_SHIFT |
@@ -181,27 +171,20 @@ static void fill(struct link* link, double period_s) {
     if (!commit) link->last_tick = whole - LEAST_TICKS;
     if ((int32_t)(whole - link->last_tick) < LEAST_TICKS) commit = 0;
     if (commit) link->last_tick = whole;
-    word[WRITE_AXIS_REQUESTS] = requests;
-    word[WRITE_SET_POINT_TICK] = whole;
-    word[WRITE_SET_POINT_COMMIT] = commit;
+    values[list_word(WRITE_NODE_AXIS_REQUESTS, to->axes, 0)] = requests;
+    values[list_word(WRITE_NODE_SET_POINT_TICK, to->axes, 0)] = whole;
+    values[list_word(WRITE_NODE_SET_POINT_COMMIT, to->axes, 0)] = commit;
 }
 
 static void write_node(void* arg, long period_ns) {
     struct link* link = arg;
     struct node* to = &link->node;
     double period_s = (double)period_ns * NS;
-    size_t length;
-    if (in_session(link)) {
-        if (link->clock.nominal == 0)
-            node_clock_start(&link->clock, period_s, to->clk_hz, to->tick);
-        node_clock_step(&link->clock);
-        fill(link, period_s);
-        length = packet_request(&to->link, node_time(to), link->values, 0, 0, link->packet);
-    } else {
-        link->started = false;
-        link->clock.nominal = 0;
-        length = node_set_up_request(to, link->packet);
-    }
+    if (link->clock.nominal == 0) node_clock_start(&link->clock, period_s, to->clk_hz, to->tick);
+    node_clock_step(&link->clock);
+    fill(link, period_s);
+    uint32_t time = node_time(to);
+    size_t length = packet_request(&to->link, time, link->values, 0, 0, link->packet);
     to->sent_at = carrier_now();
     carrier_send(&to->carrier, link->packet, length);
     link->waiting = true;
@@ -221,12 +204,11 @@ static int export_pins(const struct moire_pin* pins, size_t count, void* of, con
 static int export_link(struct link* link, unsigned number) {
     char name[MOST_NAME];
     rtapi_snprintf(name, sizeof name, "moire.%u", number);
-    int failed =
-        export_pins(NODE_PINS, sizeof NODE_PINS / sizeof *NODE_PINS, &link->pins, name);
+    int failed = export_pins(NODE_PINS, sizeof NODE_PINS / sizeof *NODE_PINS, &link->pins, name);
     for (unsigned n = 0; n < link->node.axes && !failed; n++) {
         rtapi_snprintf(name, sizeof name, "moire.%u.axis.%u", number, n);
-        failed = export_pins(AXIS_PINS, sizeof AXIS_PINS / sizeof *AXIS_PINS,
-                             &link->axis[n].pins, name);
+        failed =
+            export_pins(AXIS_PINS, sizeof AXIS_PINS / sizeof *AXIS_PINS, &link->axis[n].pins, name);
     }
     if (failed) return failed;
     *link->pins.packet_read_timeout = 0.2;
@@ -239,19 +221,14 @@ static int export_link(struct link* link, unsigned number) {
 }
 
 static bool start(struct link* link, unsigned number) {
-    struct node* to = &link->node;
     if (axes[number] < 1 || axes[number] > MOST_AXES) {
         rtapi_print_msg(RTAPI_MSG_ERR, "moire: axes=%d: a node has 1 to %d axes\n", axes[number],
                         MOST_AXES);
         return false;
     }
-    to->axes = (unsigned)axes[number];
-    if (getrandom(&to->session, 3, 0) != 3) return false;
-    to->session |= 1;  // never 0, the session of the set-up
-    to->watchdog_ms = simulated ? 0 : WATCHDOG_MS;
-    to->time_window_ms = simulated ? 0 : WINDOW_MS;
-    if (node_set_up(to, node[number])) return true;
-    rtapi_print_msg(RTAPI_MSG_ERR, "moire: %s: %s\n", node[number], to->why);
+    uint32_t of = (uint32_t)session[number];
+    if (node_open(&link->node, node[number], (unsigned)axes[number], of)) return true;
+    rtapi_print_msg(RTAPI_MSG_ERR, "moire: %s: %s\n", node[number], link->node.why);
     return false;
 }
 

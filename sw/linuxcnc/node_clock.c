@@ -5,8 +5,8 @@
 
 // a natural frequency of 0.01 rad per period, critically damped: 1.6 Hz at a period of 1 ms
 static const double PROPORTIONAL = 0.02, INTEGRAL = 0.0001;
-static const double MOST_DRIFT = 1e-3;     // of the nominal frequency
-static const double MOST_LATE = 50;      // periods; more is another clock: the node was restarted
+static const double MOST_DRIFT = 1e-3;  // of the nominal frequency
+static const double MOST_LATE = 50;     // periods; more is another clock: the node was restarted
 static const double MILLION = 1e6;
 
 void node_clock_start(struct node_clock* clock, double period_s, double clk_hz, double tick) {

@@ -40,7 +40,8 @@ bool packet_reply(const struct link_session* link, const uint8_t* packet, size_t
     if (length != packet_reply_length(link)) return false;
     size_t words = length / 4 - 1;
     if (word_at(packet, words) != crc_of(packet, words)) return false;
-    if (word_at(packet, PACKET_REPLY_IDENTITY) != (PACKET_KIND_REPLY | link->session << 8)) return false;
+    if (word_at(packet, PACKET_REPLY_IDENTITY) != (PACKET_KIND_REPLY | link->session << 8))
+        return false;
     if (word_at(packet, PACKET_REPLY_SEQUENCE) != link->sequence) return false;
     reply->time = word_at(packet, PACKET_REPLY_TIME);
     uint64_t counts =

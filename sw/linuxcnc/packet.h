@@ -10,8 +10,8 @@
 #include "made/packet_layout.h"
 
 enum { PACKET_LONGEST = 4 * PACKET_LONGEST_WORDS };  // bytes
-enum { CAUSE_COUNTS = 6 };                          // counts of refused requests
-#define SPARE_WRITE 0x80000000u                    // beside the address of a spare access
+enum { CAUSE_COUNTS = 6 };                           // counts of refused requests
+#define SPARE_WRITE 0x80000000u                      // beside the address of a spare access
 
 // A session: what host and node have agreed at set-up, and the sequence of the last request.
 struct link_session {

@@ -19,6 +19,8 @@ from twin.build import ROOT
 BUILD = ROOT / "build" / "mutation"
 SELECTOR = "mutant"
 NETLIST, MUTATED, LIST = "netlist.v", "mutated.il", "mutants.ys"
+ELABORATED = "elaborated.il"
+Fault = tuple[str, str, str, str]  # source, kind of cell, port, mode of MODES
 MODES = {
     "inv": "inverted",
     "const0": "tied to 0",
@@ -76,7 +78,7 @@ class CellMutant:
         return lines[int(self.line) - 1].strip()
 
     @property
-    def fault(self) -> tuple[str, str, str, str]:
+    def fault(self) -> Fault:
         """What it has in common with the mutants of other bits, also in other builds."""
         return self.source, self.kind, self.port, self.mode
 
@@ -133,20 +135,56 @@ def with_parameters(text: str, top: str, values: dict[str, str]) -> str:
     return re.sub(rf"^  wire (\[\d+:0\] {SELECTOR};)", r"  reg \1", text, flags=re.M)
 
 
+def lists_of(
+    folder: Path, top: str, count: int, seed: int, faults: Sequence[Fault]
+) -> dict[Path, str]:
+    """{file of a list of mutants: the pass that makes it}: so many of the block, or of each of
+    these faults.
+    """
+    options = f"-list {count} -seed {seed}"
+    if not faults:
+        return {folder / "list": f"mutate {options} -o {folder}/list {top}"}
+    return {
+        folder / f"list-{n}": f"mutate {options} -mode {mode} -port {port} -src {ROOT}/{source} "
+        f"-o {folder}/list-{n} {top}"
+        for n, (source, _, port, mode) in enumerate(faults)
+    }
+
+
 def prepared(
-    source: Path, values: netlist.Parameters, folders: Sequence[Path], count: int, seed: int
+    source: Path,
+    values: netlist.Parameters,
+    folders: Sequence[Path],
+    count: int,
+    seed: int,
+    faults: Sequence[Fault] = (),
 ) -> Path:
-    """The folder of the netlist of a block with so many mutants, made once."""
-    top, bits = source.stem, count.bit_length()
+    """The folder of the netlist of a block with so many mutants, made once; or with so many of each
+    of these faults.
+    """
+    top = source.stem
     change = "".join(f" -set {name} {netlist.literal(value)}" for name, value in values.items())
 
     def make(folder: Path) -> None:
+        lists = lists_of(folder, top, count, seed, faults)
         passes = [
             f"read_verilog -sv {source}",
             f"chparam{change} {top}" if change else "",
             f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
             f"prep -top {top}; write_json {folder}/interface.json",
-            f"mutate -list {count} -seed {seed} -ctrl {SELECTOR} {bits} 1 -o {folder}/{LIST} {top}",
+            f"write_rtlil {folder}/{ELABORATED}",
+            *lists.values(),
+        ]
+        yosys(passes, folder / "elaborated.log")
+        lines = [line for file in lists for line in file.read_text().splitlines()]
+        bits = len(lines).bit_length()
+        numbered = [
+            line.replace("mutate ", f"mutate -ctrl {SELECTOR} {bits} {n} ", 1)
+            for n, line in enumerate(lines, 1)
+        ]
+        (folder / LIST).write_text("".join(f"{line}\n" for line in numbered))
+        passes = [
+            f"read_rtlil {folder}/{ELABORATED}",
             f"script {folder}/{LIST}; write_rtlil {folder}/{MUTATED}",
             f"delete -input {top}/{SELECTOR}; write_verilog -noattr {folder}/{NETLIST}",
         ]
@@ -159,7 +197,7 @@ def prepared(
 
     files = [*netlist.parts(source, folders), Path(__file__), Path(netlist.__file__)]
     files += [ROOT / v for v in values.values() if isinstance(v, str) and (ROOT / v).is_file()]
-    name = build.digest(files, sorted(values.items()), count, seed)
+    name = build.digest(files, sorted(values.items()), count, seed, sorted(faults))
     return build.made_once(BUILD / f"{top}-mutants-{name}", NETLIST, make).parent
 
 

@@ -24,10 +24,11 @@ from functools import cache
 from pathlib import Path
 
 from mutation import equivalence
-from mutation.block import BUILD, CellMutant, MutationError, Run, mutants_of
+from mutation.block import BUILD, CellMutant, Fault, MutationError, Run, mutants_of
 from twin.build import ROOT, rtl_path
 
 MUTANTS = 1000  # of a block
+LOOK = 30  # of a fault in another build
 REASONS = Path(__file__).with_name("blocks.toml")
 RECORD = ROOT / "docs" / "mutants.toml"
 HEAD = """\
@@ -167,9 +168,10 @@ def build_words(parameters: Mapping[str, int | str]) -> str:
 
 
 Results = dict[CellMutant, bool]  # whether a test finds it
+Runs = Sequence[tuple[Run, dict[int, str]]]
 
 
-def results_of(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> dict[str, Results]:
+def results_of(block: str, runs: Runs) -> dict[str, Results]:
     """{folder of a build: its results}. A mutant that one of several tests of the same build finds
     is found.
     """
@@ -193,19 +195,50 @@ def found_elsewhere(mutant: CellMutant, others: Sequence[Results]) -> bool:
     return False
 
 
-def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
+class Builds:
+    """The results of all builds of a block: those of its own mutants, and those of runs that look
+    for the faults that other builds have left.
+    """
+
+    def __init__(self, block: str, runs: Runs, looks: Runs = ()):
+        self.results = results_of(block, runs)
+        self.parameters = {run.folder: run.parameters for run, _ in [*runs, *looks]}
+        self.known: dict[str, list[Results]] = {}  # words of the parameters
+        for folder, results in [*self.results.items(), *results_of(block, looks).items()]:
+            self.known.setdefault(build_words(self.parameters[folder]), []).append(results)
+
+    def seen(self, folder: str, mutant: CellMutant) -> bool:
+        """Whether tests see the fault, in its build or in another one."""
+        own = build_words(self.parameters[folder])
+        others = [
+            {mutant: found for results in known for mutant, found in results.items()}
+            for words, known in self.known.items()
+            if words != own
+        ]
+        return self.results[folder][mutant] or found_elsewhere(mutant, others)
+
+    def left(self) -> list[tuple[Fault, dict[str, int | str]]]:
+        """Each fault that no test sees, with the parameters of its build."""
+        found: list[tuple[Fault, dict[str, int | str]]] = []
+        for folder, results in self.results.items():
+            for mutant in results:
+                left = mutant.fault, self.parameters[folder]
+                if mutant.source and left not in found and not self.seen(folder, mutant):
+                    found.append(left)
+        return found
+
+
+def judge(block: str, runs: Runs, looks: Runs = ()) -> Verdicts:
     """The verdicts of the runs of a block."""
     verdicts, met = Verdicts(), dict[Reason, bool]()  # whether it is needed
     source = next((ROOT / "rtl").rglob(f"{block}.sv"))
-    results = results_of(block, runs)
-    parameters = {run.folder: run.parameters for run, _ in runs}
-    for folder, build in results.items():
-        path, words = Path(folder), build_words(parameters[folder])
-        others = [other for name, other in results.items() if name != folder]
+    builds = Builds(block, runs, looks)
+    for folder, results in builds.results.items():
+        path, words = Path(folder), build_words(builds.parameters[folder])
         unseen: dict[CellMutant, Reason | None] = {}
-        for mutant, found in build.items():
+        for mutant in results:
             reason = next((r for r in reasons() if fits(r, block, words, mutant)), None)
-            seen = found or found_elsewhere(mutant, others)
+            seen = builds.seen(folder, mutant)
             if reason:
                 met[reason] = met.get(reason, False) or not seen
             if seen:
@@ -214,7 +247,7 @@ def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
                 unseen[mutant] = reason
         if not unseen:
             continue
-        ports = equivalence.pair(path, source, parameters[folder], rtl_path())
+        ports = equivalence.pair(path, source, builds.parameters[folder], rtl_path())
         compared = equivalence.compared(path, ports, [mutant.number for mutant in unseen])
         for mutant, reason in unseen.items():
             verdict, how = compared[mutant.number]
@@ -230,20 +263,30 @@ def judge(block: str, runs: Sequence[tuple[Run, dict[int, str]]]) -> Verdicts:
     return verdicts
 
 
+def simulated(folder: Path, block: str, **asked: object) -> Runs:
+    """The runs of the tests of a block, with mutants as they are asked for."""
+    folder.mkdir()
+    request = folder / "request"
+    request.write_text(json.dumps({"block": block, **asked}))
+    pytest(tests()[block], {"MUTANTS": str(request)})
+    return Run.all(folder)
+
+
 def measured(block: str, count: int = MUTANTS, seed: int = 1, only: str = "") -> Verdicts:
     """Run so many mutants of a block against its tests, or against those cocotb tests whose names
-    have `only` in them.
+    have `only` in them. Faults that a build leaves are then looked for in its other builds.
     """
     BUILD.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=BUILD, prefix="run-") as folder:
-        request = Path(folder) / "request"
-        asked = {"block": block, "count": max(1, round(count / builds_of(block))), "seed": seed}
-        request.write_text(json.dumps({**asked, "tests": only}))
-        pytest(tests()[block], {"MUTANTS": str(request)})
-        runs = Run.all(Path(folder))
+    with tempfile.TemporaryDirectory(dir=BUILD, prefix="run-") as temporary:
+        folder, each = Path(temporary), max(1, round(count / builds_of(block)))
+        asked = {"seed": seed, "tests": only}
+        runs = simulated(folder / "runs", block, count=each, faults=[], **asked)
         if not runs:
             raise MutationError(f"{block}: no test has made a build of it")
-        return judge(block, runs)
+        looks: Runs = ()
+        if (left := Builds(block, runs).left()) and builds_of(block) > 1:
+            looks = simulated(folder / "looks", block, count=LOOK, faults=left, **asked)
+        return judge(block, runs, looks)
 
 
 def record(block: str, verdicts: Verdicts, count: int, seed: int) -> None:

@@ -20,7 +20,7 @@ from mutation import block
 from twin import netlist
 
 DEPTH = 40  # cycles in which a difference is searched
-SEARCH_S, PROOF_S = 10, 20  # of computing time
+SEARCH_S, PROOF_S = 5, 10  # of computing time
 EQUIVALENT, UNDECIDED, DIFFERENT = "equivalent", "undecided", "different"
 NO_STATE = re.compile(r"lat = +0 ")  # what `print_stats` says of a combinational block
 PAIR, CONTRACT = "pair.il", "contract"

@@ -8,6 +8,7 @@ from twin.machines.machine import Machine
 from twin.machines.ring import RotaryRing
 from twin.nodes.twin import (
     START_S,
+    WITH_SCOPE,
     WITH_SEGMENTS,
     Axis,
     BusState,
@@ -36,6 +37,7 @@ __all__ = [
     "DevicesBench",
     "Twin",
     "TwinTransport",
+    "WITH_SCOPE",
     "WITH_SEGMENTS",
     "cells_of",
     "realtime_factor",

@@ -408,7 +408,7 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
 
 
 def verilate_node(
-    folder: Path, verilator: Path, clk_hz: int, axes: int, node: Mapping[str, int]
+    folder: Path, verilator: Path, clk_hz: int, axes: int, node: Mapping[str, int | str]
 ) -> None:
     """C++ of a node, and the header that names its memory. Random crossings read a pin more than
     once, which sw/twin/rising_edge.py does not handle: Verilator evaluates such a node itself.
@@ -462,9 +462,11 @@ def verilate_node(
 
 
 def netlist_of_node(
-    family: str, clk_hz: int, axes: int, node: Mapping[str, int], words: Sequence[int]
+    chosen: str, clk_hz: int, axes: int, node: Mapping[str, int | str], words: Sequence[int]
 ) -> list[Path]:
-    """Sources of the netlist of a node, whose memory has these words since synthesis."""
+    """Sources of the netlist of a node, whose memory has these words since synthesis; a serial core
+    reads them from its flash.
+    """
     image = BUILD / f"{digest([], list(words))}.hex"
     BUILD.mkdir(parents=True, exist_ok=True)
     image.write_text("".join(f"{word:08x}\n" for word in words))
@@ -472,14 +474,19 @@ def netlist_of_node(
         "CLK_HZ": clk_hz,
         "AXES": axes,
         "MEMORY_BYTES": MEMORY_BYTES,
-        "FIRMWARE": str(image.relative_to(ROOT)),
+        "FIRMWARE": "" if node.get("HAS_SERIAL_CORE") else str(image.relative_to(ROOT)),
         **node,
     }
-    return netlist.sources(family, ROOT / "rtl" / "node.sv", values, rtl_path())
+    return netlist.sources(chosen, ROOT / "rtl" / "node.sv", values, rtl_path())
 
 
 def verilate_netlist(
-    folder: Path, verilator: Path, sources: Sequence[Path], clk_hz: int, axes: int
+    folder: Path,
+    verilator: Path,
+    sources: Sequence[Path],
+    clk_hz: int,
+    axes: int,
+    node: Mapping[str, int | str],
 ) -> None:
     """C++ of the netlist of a node."""
     run(
@@ -496,22 +503,25 @@ def verilate_netlist(
         "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
         f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
-        f"constexpr bool SERIAL_CORE = false;\n{BOTH_LEVELS}"
+        f"constexpr bool SERIAL_CORE = {'true' if node.get('HAS_SERIAL_CORE') else 'false'};\n"
+        f"{BOTH_LEVELS}"
     )
 
 
 def twin_library(
     clk_hz: int = 2_400_000,
     axes: int = 1,
-    node: Mapping[str, int] | None = None,
+    node: Mapping[str, int | str] | None = None,
     words: Sequence[int] = (),
+    family: str | None = None,
 ) -> Path:
     """libtwin.so: Verilated nodes, machines and line. node: more parameters of rtl/node.sv, {name:
-    value}. With NETLIST=ecp5|ice40 in the environment, the nodes are netlists with the firmware
-    `words` in their memory.
+    value}. With a family (ecp5, ice40, gowin), which may be followed by options of its synthesis,
+    or NETLIST=family in the environment, the nodes are netlists with the firmware `words` in their
+    memory.
     """
     tool = compiler()
-    family = os.environ.get("NETLIST")
+    family = family or os.environ.get("NETLIST")
     cells = netlist_of_node(family, clk_hz, axes, node or {}, words) if family else []
     verilator = package("verilator", "it makes C++ of the RTL")
     sources = [
@@ -543,7 +553,7 @@ def twin_library(
     def make(folder: Path) -> None:
         (folder / "parameters.h").write_text(parameters.header())
         if cells:
-            verilate_netlist(folder, verilator, cells, clk_hz, axes)
+            verilate_netlist(folder, verilator, cells, clk_hz, axes, node or {})
         else:
             verilate_node(folder, verilator, clk_hz, axes, node or {})
         report(f"verilated after {time.monotonic() - start:.0f} s")

@@ -2,7 +2,8 @@
 """The netlist that Yosys makes of a module for a family of FPGAs, as sources of a simulation.
 
 The primitives are Yosys's own models (its folder share), without the timing that Icarus does not
-read. Yosys has no model of two primitives of the ECP5: dp16kd.vh and mult18x18d.vh are ours. A
+read. Yosys has no model of two primitives of the ECP5, dp16kd.vh and mult18x18d.vh are ours, and
+none of the block RAMs and the multiplier of a Gowin part: gowin_*. A
 wrapper has the name, the ports and the parameters of the module, so that a test sees no difference,
 as long as it uses ports only. All of it is kept under build/netlist by the contents of everything
 that goes in.
@@ -17,7 +18,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,10 +28,19 @@ HERE = Path(__file__).resolve().parent
 BODIES = HERE / "primitives"
 ROOT = HERE.parents[1]
 BUILD = ROOT / "build" / "netlist"
-FAMILIES = ("ecp5", "ice40")
+FAMILIES = ("ecp5", "ice40")  # for which the tests of all blocks run
 SUFFIX = "_netlist"  # of the module that Yosys has made, below its wrapper
 TIMING = re.compile(r"^[ \t]*specify\b.*?^[ \t]*endspecify\b", re.MULTILINE | re.DOTALL)
 OURS = {"DP16KD": "dp16kd.vh", "MULT18X18D": "mult18x18d.vh"}
+GOWIN = {  # our bodies of its primitives, and the bits of a group of a block RAM
+    "SP": ("gowin_single_port.vh", 8),
+    "SPX9": ("gowin_single_port.vh", 9),
+    "SDPB": ("gowin_simple_dual_port.vh", 8),
+    "SDPX9B": ("gowin_simple_dual_port.vh", 9),
+    "DPB": ("gowin_dual_port.vh", 8),
+    "DPX9B": ("gowin_dual_port.vh", 9),
+    "MULT18X18": ("gowin_mult18x18.vh", 0),
+}
 BUSES = {  # of their ports of one bit each
     "DP16KD": {"ADA": 14, "ADB": 14, "DIA": 18, "DIB": 18, "DOA": 18, "DOB": 18},
     "MULT18X18D": {"A": 18, "B": 18, "P": 36},
@@ -98,9 +108,31 @@ def primitives_ice40() -> str:
     return f"`define NO_ICE40_DEFAULT_ASSIGNMENTS\n{text}"
 
 
+def primitives_gowin() -> str:
+    """Yosys's models, and ours of the block RAMs and the multiplier."""
+    folder = share() / "gowin"
+    text, boxes = ((folder / name).read_text() for name in ("cells_sim.v", "cells_xtra_gw2a.v"))
+    ours = (BODIES / "gowin_ram.v").read_text()
+    for name, (file, unit) in GOWIN.items():
+        known = f"\n{text}" if f"\nmodule {name} " in text else f"\n{boxes}"
+        head, body = module_of(known, name), (BODIES / file).read_text()
+        text = text.replace(f"{head}endmodule", "")
+        contents = ", ".join(f"INIT_RAM_{row:02X}" for row in reversed(range(64)))
+        body = body.replace("`UNIT", str(unit)).replace("`INIT", f"{{{contents}}}")
+        ours += f"\n{head}{body}endmodule\n"
+    return text + ours
+
+
+PRIMITIVES: Mapping[str, Callable[[], str]] = {
+    "ecp5": primitives_ecp5,
+    "ice40": primitives_ice40,
+    "gowin": primitives_gowin,
+}
+
+
 def primitives(family: str) -> str:
     """The models of a family's primitives, as the text of one file."""
-    text = primitives_ecp5() if family == "ecp5" else primitives_ice40()
+    text = PRIMITIVES[family]()
     return f"`default_nettype wire\n`timescale 1ns/1ps\n{TIMING.sub('', text)}".replace(
         "`timescale 1ps / 1ps", ""
     )
@@ -123,11 +155,11 @@ def parts(source: Path, folders: Sequence[Path]) -> dict[Path, str]:
     return found
 
 
-def digest(family: str, source: Path, parameters: Parameters, folders: Sequence[Path]) -> str:
+def digest(chosen: str, source: Path, parameters: Parameters, folders: Sequence[Path]) -> str:
     """A name for everything that the netlist depends on."""
-    total = hashlib.sha256(repr((family, source.stem, sorted(parameters.items()))).encode())
+    total = hashlib.sha256(repr((chosen, source.stem, sorted(parameters.items()))).encode())
     total.update(version("pyosys").encode())
-    for path in (*sorted(BODIES.glob("*.vh")), Path(__file__), ROOT / "tools" / "yosys.py"):
+    for path in (*sorted(BODIES.glob("*.v*")), Path(__file__), ROOT / "tools" / "yosys.py"):
         total.update(path.read_bytes())
     for path, text in sorted(parts(source, folders).items()):
         total.update(path.name.encode() + text.encode())
@@ -177,10 +209,10 @@ def wrapper(top: str, module: dict[str, Any]) -> str:
 
 
 def synthesise(
-    family: str, source: Path, parameters: Parameters, folders: Sequence[Path], out: Path
+    chosen: str, source: Path, parameters: Parameters, folders: Sequence[Path], out: Path
 ) -> None:
     """Yosys writes netlist.v and the interface of the module into the folder `out`."""
-    top = source.stem
+    top, family = source.stem, chosen.split()[0]
     change = "".join(f" -set {name} {literal(value)}" for name, value in parameters.items())
     passes = [
         f"read_verilog -sv {source}",
@@ -188,7 +220,7 @@ def synthesise(
         f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
         "design -save elaborated; proc",
         f"write_json {out}/interface.json",
-        f"design -load elaborated; synth_{family} -top {top}",
+        f"design -load elaborated; synth_{chosen} -top {top}",
         f"check -assert; rename {top} {top}{SUFFIX}",
         f"write_verilog -noattr {out}/netlist.v",
     ]
@@ -201,14 +233,15 @@ def synthesise(
 
 
 def sources(
-    family: str, source: Path, parameters: Parameters, folders: Sequence[Path]
+    chosen: str, source: Path, parameters: Parameters, folders: Sequence[Path]
 ) -> list[Path]:
     """[primitives, netlist, wrapper] of a module with these parameters: what a simulation compiles
-    in place of its RTL.
+    in place of its RTL. `chosen` is a family, and perhaps options of its synthesis.
     """
-    if family not in FAMILIES:
-        raise NetlistError(f"NETLIST={family}: it is one of {', '.join(FAMILIES)}")
-    tag = digest(family, source, parameters, folders)
+    family = next(iter(chosen.split()), "")
+    if family not in PRIMITIVES:
+        raise NetlistError(f"NETLIST={chosen}: it is one of {', '.join(PRIMITIVES)}")
+    tag = digest(chosen, source, parameters, folders)
     folder = BUILD / family / f"{source.stem}-{tag}"
     BUILD.mkdir(parents=True, exist_ok=True)
     with open(BUILD / f"{family}-{source.stem}-{tag}.lock", "w") as lock:
@@ -217,7 +250,7 @@ def sources(
             folder.parent.mkdir(exist_ok=True)
             making = Path(tempfile.mkdtemp(dir=BUILD, prefix="making-"))
             try:
-                synthesise(family, source, parameters, folders, making)
+                synthesise(chosen, source, parameters, folders, making)
                 os.rename(making, folder)
             finally:
                 shutil.rmtree(making, ignore_errors=True)

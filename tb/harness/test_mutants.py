@@ -4,6 +4,7 @@ block, and reasons that are kept for existing lines only.
 """
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -102,6 +103,33 @@ def test_a_mutant_is_found_if_another_build_finds_those_of_other_bits_at_its_pla
     elsewhere = mutant_of(LINE.replace("24.19", "25.19"))
     assert blocks.found_elsewhere(mutant, [{other: True, elsewhere: False}])
     assert not blocks.found_elsewhere(mutant, [{other: False}, {elsewhere: True}])
+
+
+def test_a_fault_that_a_build_leaves_is_looked_for_in_the_builds_with_other_parameters(
+    tmp_path, divider
+):
+    mutant = next(m for m in mutants_of(divider) if m.kind == "procdff")
+    left = [mutant.fault, {"W": 8}]
+    asked = {"block": "tick_divider", "count": 30, "seed": 1, "tests": "", "faults": [left]}
+    (tmp_path / "request").write_text(json.dumps(asked))
+    with pytest.raises(pytest.skip.Exception, match="left by this build"):
+        of_mutants(tmp_path / "request", source_of("tick_divider"), {"W": 8}, "x")
+    of_mutants(tmp_path / "request", source_of("tick_divider"), {"W": 4}, "narrow")
+    folder = Path(json.loads((tmp_path / "narrow.json").read_text())["folder"])
+    same = [m for m in mutants_of(folder) if m.fault == mutant.fault]
+    assert len(same) > 1 and {(m.source, m.mode) for m in mutants_of(folder)} == {
+        (mutant.source, mutant.mode)
+    }
+    (tmp_path / "runs").mkdir()
+    runs = runs_of(tmp_path / "runs", divider, {mutant.number: ""})
+    assert blocks.Builds("tick_divider", runs).left() == [(mutant.fault, {"W": 8})]
+    for missed in (None, same[-1].number):
+        verdicts = "".join(
+            f"{m.number} {'' if m.number == missed else 'a_test'}\n" for m in mutants_of(folder)
+        )
+        (tmp_path / "narrow.verdicts").write_text(verdicts)
+        builds = blocks.Builds("tick_divider", runs, Run.all(tmp_path))
+        assert builds.seen(str(divider), mutant) == (missed is None)
 
 
 def test_every_reason_is_about_a_line_that_exists():

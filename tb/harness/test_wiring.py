@@ -139,3 +139,18 @@ def test_only_connections_that_differ_from_the_base_are_new(monkeypatch):
     assert [c.port for c in wiring.changed()] == ["sdi"]
     monkeypatch.setattr(wiring, "git", lambda *words: b"")  # git sees no difference
     assert not wiring.changed()
+
+
+def test_faults_of_an_instance_that_the_design_does_not_have_need_a_reason_and_are_not_run():
+    verdicts = wiring.run([RTL / "node.sv"], lambda c: "serial_core" in c.instance)
+    assert verdicts.explained and not verdicts.killed and not verdicts.failures
+
+
+def test_small_diagrams_of_a_design_share_a_build():
+    groups = wiring.together(diagrams())
+    assert sorted(file for group in groups for file in group) == sorted(diagrams())
+    assert len(groups) < len(diagrams())
+    for group in groups:
+        assert len({wiring.design_of(file) for file in group}) == 1
+        assert len(group) == 1 or sum(len(of_diagram(file)) for file in group) <= wiring.MOST
+    assert len(wiring.together(diagrams(), most=0)) == len(diagrams())

@@ -338,6 +338,13 @@ def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
     written = node.parameters()
     call = Call(["tune", str(record), "--check", "--json"], node)
     assert call.code == 0 and call.results[0]["bandwidth_hz"] == pytest.approx(40, rel=0.05)
+    kept = tmp_path / "before.json"
+    call = Call(["tune", str(record), "--write", "--keep", str(kept)], node)
+    assert call.code == 0 and node.parameter("kp") > written["kp"], "as fast as the margins allow"
+    assert "loop, in force: 4" in call.out and "loop, gains alone:" in call.out
+    assert Call(["tune", "--undo", str(kept)], node).code == 0 and node.parameters() == written
+    kept.write_text('{"kp": 5}')
+    assert "has no gains and filters" in sentence(Call(["tune", "--undo", str(kept)], node), 1)
     node.force("kp", 100 * written["kp"])
     refused = sentence(Call(["tune", str(record), "--check"], node), 1)
     assert "has a phase margin of 6 degrees" in refused and "set kp to 1." in refused
@@ -347,12 +354,17 @@ def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ("", "--bandwidth is missing"),
         ("--check --bandwidth 40Hz", "--check and --bandwidth do not go together"),
         ("--check --write", "--check and --write do not go together"),
+        ("--method response", "FILE and --method response do not go together"),
+        ("--method guess", "there is no method 'guess'"),
+        ("--keep before.json", "--keep goes with --write"),
+        ("--undo before.json", "--undo and file do not go together"),
+        ("--speed -1mm/s", "below zero"),
+        ("--peak 0%", "not above zero"),
     ],
 )
-def test_tune_needs_either_a_bandwidth_or_a_check(options, message):
+def test_options_of_tune_that_contradict_each_other_are_refused(options, message):
     assert message in sentence(Call(f"tune record.csv {options}"), 2)
 
 
@@ -512,7 +524,7 @@ def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
         ("override 120%", "'120%' is no share of full speed: write 0% to 100%, or 0 to 1"),
         ("home --method zero", "'zero' is no method: allowed are a number of CiA 402, s0, s3"),
         ("start", "AXIS is missing"),
-        ("tune record.csv", "--bandwidth is missing"),
+        ("tune --undo /no/such/file", "the file /no/such/file cannot be read"),
         ("tune /no/such/file --bandwidth 40Hz", "cannot be read"),
         ("register axis.speed", "there is no register 'axis.speed'"),
         ("register 0x401", "multiples of 4"),

@@ -286,6 +286,21 @@ def test_selftest_finds_and_names_what_is_wrong(spoil, name, message):
     assert reported[1]["error"] == "SelfTestFailed"
 
 
+def test_selftest_of_the_pins_leaves_the_checks_of_the_machine_out():
+    call = Call("selftest --pins open", BusNode())
+    assert "FAILED   axis 0 open inputs reads 0: limit_low_open, limit_high_open, es" in call.out
+    assert "node 1 failed 1 of 4 checks: axis 0 open inputs" in sentence(call, 1)
+    node = BusNode()
+    call = Call("selftest --pins plug", node)
+    assert "passed   axis 0 closed inputs limits and emergency stop read 0\n" in call.out
+    assert "parameters" not in call.out and not node.axes[0].enabled
+
+
+def test_selftest_of_other_pins_is_refused():
+    call = Call("selftest --pins all", BusNode())
+    assert call.code != 0 and "check of the pins" in call.err
+
+
 def test_selftest_counts_errors_on_the_bus():
     bus, count = Rs485Bus(BusNode()), [0]
 

@@ -3,23 +3,34 @@
 (`make chromium`) these tests are skipped.
 """
 
+import json
 import re
 
 import pytest
 
 from figures import browser as chromium
 from moire.client import remedies
+from moire.client.bus import Bus
+from moire.client.segments import Segments, SegmentTable
+from moire.description import AxisDescription, Description
 from moire.made.bus_tables import FAULTS
+from moire.web.jog import Jog
 from tb.bench import ROOT
+from tb.fakes.bus_node import BusNode
 from tb.fakes.frozen_network import FrozenNetwork
+from tb.fakes.rs485_bus import Rs485Bus
 from tb.fakes.served import Served, homed
+from tb.host.test_host_feedback import node_with_signal
+from tb.host.test_host_job import Workshop
 from tb.host.test_host_page_scope import turning
+from twin.compiled.node import PERIOD
 
 AXIS = "/api/nodes/1/axes/0"
 PICTURE = ROOT / "build" / "report" / "page.png"  # docs/page.png is a copy
 SCOPE_PICTURE = PICTURE.with_name("page_scope.png")  # the same
 PATIENCE_MS = 30_000
 WIDTHS = (380, 1280, 2560)
+HOLD_S = 2  # of a jog: a busy computer delays what the page asks for ten times a second
 ESTOP = next(code for code, (name, _) in FAULTS.items() if name == "estop")
 
 
@@ -177,7 +188,11 @@ def by_the_button_when_the_websocket_is_silent(page):
     page.evaluate(
         """() => {
             const { send } = WebSocket.prototype;
-            WebSocket.prototype.send = () => { WebSocket.prototype.send = send; };
+            WebSocket.prototype.send = function (text) {
+                // nothing else may be lost: without its beat the page would connect again
+                if (text.includes("/stop")) WebSocket.prototype.send = send;
+                else send.call(this, text);
+            };
         }"""
     )
     page.locator("#stop").click()
@@ -227,19 +242,21 @@ def stopped(page, at):
 
 
 def frozen(page, at):
-    page.evaluate("setTimeout(() => { const end = Date.now() + 1500; while (Date.now() < end); })")
+    page.evaluate("setTimeout(() => { const end = Date.now() + 3500; while (Date.now() < end); })")
 
 
 @pytest.mark.parametrize("let_go", [lifted, left, hidden, without_focus, stopped, frozen])
-def test_a_held_button_moves_until_it_is_let_go(served, page, let_go):
+def test_a_held_button_moves_until_it_is_let_go(served, page, let_go, monkeypatch):
+    monkeypatch.setattr("moire.web.jog.HOLD_S", HOLD_S)
+    held, hold = [], Jog.hold
+    monkeypatch.setattr(Jog, "hold", lambda self: (held.append(self), hold(self)))
     button = page.get_by_role("button", name=re.compile("hold to move \\+"))
     button.scroll_into_view_if_needed()
     at = button.bounding_box()
     page.mouse.move(at["x"] + at["width"] / 2, at["y"] + at["height"] / 2)
     page.mouse.down()
     moving(served)
-    until = served.far.now() + 0.7  # longer than a jog that nobody holds
-    served.wait_until(lambda: served.far.now() > until)
+    served.wait_until(lambda: len(held) > 5)
     assert served.node.state() == "moving"
     let_go(page, at)
     at_rest(served)
@@ -557,6 +574,117 @@ def test_sine_and_cosine_are_drawn_with_their_ellipse_and_what_to_do(served, pag
     see(page, "#signal .message.wrong", "too weak: the smaller channel has")
     see(page, "#signal .message.wrong", "What to do: clean scale and head")
     measure.click()
+
+
+def test_the_amplitude_along_the_travel_is_drawn_with_its_limits(served, page):
+    turning(served.node)
+    page.locator("#signal").get_by_role("button", name="Measure").click()
+    chart = page.locator("#signal canvas[aria-label^='Amplitude along the travel']")
+    chart.filter().wait_for()
+    assert chart.get_attribute("aria-label").endswith("ADC counts; the limits are 32 and 160")
+    shown = json.loads(chart.get_attribute("data-range"))
+    assert shown["low"] < 32 and shown["high"] > 160
+    page.locator("#signal").get_by_role("button", name="Measure").click()
+
+
+def test_a_calibration_shows_its_progress_its_harmonics_and_the_segment_table(browser, context):
+    node = node_with_signal()
+    node.home()
+    served = Served(node)
+    Segments(Bus(Rs485Bus(node)).axis()).load(SegmentTable(0, 1_000_000, (0, 100, -50)))
+    page = opened(context, served.door.url)
+    try:
+        panel = page.locator("#calibration")
+        panel.get_by_label("Distance in mm").fill("0.08")
+        panel.get_by_role("button", name="Calibrate").click()
+        see(page, "#calibration .message", "the correction is complete and frozen. Strokes")
+        see(page, "#calibration .message", "Segment table: linear")
+        bars = panel.locator("canvas[aria-label^='Harmonics that are corrected']")
+        with served.http() as client:
+            now = client.done("GET", f"{AXIS}/calibration")["now_nm"]
+        assert ", ".join(f"{one:.3f}" for one in now) in bars.get_attribute("aria-label")
+        scale = panel.locator("canvas[aria-label^='Error of the scale at 3 borders']")
+        assert "-50.0 to 100.0 nm" in scale.get_attribute("aria-label")
+        page.set_viewport_size({"width": 380, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 380
+        page.set_viewport_size({"width": 1280, "height": 1000})
+        panel.get_by_label("Distance in mm").fill("far")
+        panel.get_by_role("button", name="Calibrate").click()
+        see(page, "#calibration .message.wrong", '"far" is no number')
+    finally:
+        page.close()
+        served.end()
+
+
+def test_the_first_set_up_is_followed_step_by_step(browser, context):
+    served = Served(BusNode())
+    page, axis = opened(context, served.door.url), served.node.axes[0]
+    try:
+        see(page, "#setup summary", "First set-up, step by step")
+        page.locator("#setup summary").focus()
+        page.keyboard.press("Enter")
+        see(page, "#setup [data-step=switches]", "not seen yet: low limit, high limit, emergency")
+        pressed = {
+            "low limit": {"low_at": axis.machine},
+            "high limit": {"low_at": axis.machine - PERIOD, "high_at": axis.machine},
+            "emergency stop": {"high_at": axis.machine + PERIOD, "causes": 1 << ESTOP},
+        }
+        for name, values in pressed.items():
+            vars(axis).update(values)
+            see(page, "#setup [data-step=switches]", f"pressed now: {name}")
+        vars(axis).update(causes=0, high_at=None, pressed_high=False)
+        press(page, "Clear fault")
+        see(page, "#setup [data-step=switches][data-state=done]", "all were seen")
+        for by, state in ((-20_000, "wrong"), (20_000, "done")):
+            page.get_by_role("button", name="I am going to move it").click()
+            see(page, "#setup [data-step=direction]", "move it now")
+            axis.machine += by * PERIOD // 800
+            page.locator(f"#setup [data-step=direction][data-state={state}]").wait_for()
+        page.locator("#setup [data-step=signal]").get_by_role("button").click()
+        see(page, "#setup [data-step=signal]", "too few different samples")
+        limit = page.locator("#setup").get_by_label("largest following error")
+        limit.fill("5")
+        limit.press("Tab")
+        see(page, "#setup [data-step=limits][data-state=wrong]", "has no unit")
+        limit.fill("40 um")
+        limit.press("Tab")
+        see(page, "#setup [data-step=limits][data-state=done]", "following_limit is 40um")
+        assert served.node.parameter("following_limit") == 50 * 65536
+        page.locator("#setup").get_by_role("button", name="Home").click()
+        see(page, "#setup [data-step=home][data-state=done]", "homed at 0.000")
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 1000})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.set_viewport_size({"width": 1280, "height": 1000})
+    finally:
+        page.close()
+        served.end()
+
+
+def test_a_job_is_shown_and_begun(browser, context):
+    workshop = Workshop()
+    workshop.job.load(["0deg", "1.5deg"])
+    served = Served(workshop.station)
+    page = opened(context, served.door.url)
+    try:
+        see(page, "#job [data-field=words]", "station 1 of 2")
+        page.locator("#job").get_by_role("button", name="Start").click()
+        page.locator("#job").get_by_role("button", name="Stop the job").click()
+        page.locator("#job").get_by_role("button", name="Start").wait_for()
+    finally:
+        page.close()
+        served.end()
+
+
+def test_an_axis_has_the_name_of_the_description(browser, context):
+    axes = {"x": AxisDescription("x", 1, 0)}
+    served = Served(homed(), description=Description("", "", None, axes))
+    page = opened(context, served.door.url)
+    try:
+        see(page, ".axis h2", "x (axis 1.0)")
+    finally:
+        page.close()
+        served.end()
 
 
 def test_the_statistics_of_the_bus_are_shown(served, page):

@@ -117,15 +117,19 @@ class Node:
         return bytes(self.replies.pop(0))
 
 
-async def begin(dut):
+async def begin(dut, writes=2, reads=2):
+    """The link on, and its host; after the lists have been put, their inputs may have any level."""
     await start(dut, **INPUTS)
     await FallingEdge(dut.clk)
     node = Node(dut)
     await node.clk(rst=1)
+    node.levels |= {"writes": writes, "reads": reads}
     for n, entry in enumerate(LIST):
         await node.clk(list_put=1, list_at=n, list_entry=entry)
+    for n in range(len(LIST)):
+        await node.clk(list_at=n, list_entry=0xBAD_0BAD)
     node.levels["enable"] = 1
-    return node, Link(SESSION, 2, 2)
+    return node, Link(SESSION, writes, reads)
 
 
 @cocotb.test()
@@ -173,6 +177,58 @@ async def the_watchdog_expires_after_its_time_and_a_bad_packet_does_not_kick_it(
     await node.send(host.request(node.levels["now"], [1, 2]))
     assert not node.expired
     await node.answered()
+
+
+@cocotb.test()
+async def both_lists_have_lengths_of_their_own_and_stay_while_the_link_is_on(dut):
+    node, host = await begin(dut, writes=1)
+    await node.clk(list_put=1, list_at=0, list_entry=0xBAD_0BAD)
+    await node.send(host.request(node.levels["now"], [11]))
+    assert host.reply(await node.answered()).values == (0x411, 0x415)
+    assert node.registers == {0x400: 11}
+
+
+@cocotb.test()
+async def a_packet_is_refused_if_the_link_is_off_a_byte_was_lost_or_its_time_is_wrong(dut):
+    node, host = await begin(dut)
+    node.levels["enable"] = 0
+    await node.send(host.request(node.levels["now"], [1, 2]))
+    node.levels["enable"] = 1
+    await node.clk(rx_broken=1)
+    await node.send(host.request(node.levels["now"], [1, 2]))
+    for late in (2000, -2000):
+        await node.send(host.request(node.levels["now"] - late, [1, 2]))
+    assert not node.registers
+    node.levels["time_window"] = 0
+    await node.send(host.request(node.levels["now"] + 10**6, [11, 22]))
+    reply = host.reply(await node.answered())
+    assert node.registers == {0x400: 11, 0x404: 22}
+    counts = {cause: count for cause, count in reply.refused.items() if count}
+    assert counts == {"foreign": 1, "damaged": 1, "out_of_time": 2}
+
+
+@cocotb.test()
+async def the_reply_says_that_the_watchdog_has_expired_while_the_registers_were_busy(dut):
+    node, host = await begin(dut)
+    await node.send(host.request(node.levels["now"], [1, 2]))
+    node.levels["ready"] = 0
+    for _ in range(2100):
+        await node.clk()
+    assert node.expired
+    node.levels["ready"] = 1
+    assert host.reply(await node.answered()).expired
+    await node.clk(rst=1)
+    await node.clk()
+    assert not node.expired
+
+
+@cocotb.test()
+async def the_watchdog_waits_while_the_link_is_off(dut):
+    node, _ = await begin(dut)
+    node.levels["enable"] = 0
+    for _ in range(2100):
+        await node.clk()
+    assert not node.expired
 
 
 @cocotb.test()

@@ -190,7 +190,7 @@ class IdealNode:
         self.pressed_at = self.heard_at = 0  # cycles
         self.session, self.sequence = 0, 0
         self.lists: dict[int, int] = {}
-        self.writes, self.reads = 0, 0
+        self.writes, self.reads, self.entry, self.drawn = 0, 0, 0, 0
         self.refused = [0] * len(layout.CAUSES)
         self.words: dict[int, int] = {}
         self.path: list[tuple[float, ...]] = []  # each ms of a stream: time, positions
@@ -306,6 +306,10 @@ class IdealNode:
         """Whether the emergency stop has been pressed for so long."""
         return self.estop and self.time - self.pressed_at > seconds * CLK_HZ
 
+    def unset_for(self, seconds: float) -> bool:
+        """Whether the node has been without a set-up for so long since its power came."""
+        return not self.session and self.time > seconds * CLK_HZ
+
     # ---- the link
 
     def answer(self, packet: bytes) -> bytes | None:
@@ -313,27 +317,21 @@ class IdealNode:
         words = struct.unpack(f"<{len(packet) // 4}I", packet) if len(packet) % 4 == 0 else ()
         if not words or zlib.crc32(packet[:-4]) != words[-1]:
             return self._refuse("damaged")
-        if words[0] == layout.KIND_REQUEST and self.expired:
-            self.session = self.sequence = 0
-        if words[0] != layout.KIND_REQUEST | self.session << 8:
+        if not self.session or words[0] != layout.KIND_REQUEST | self.session << 8:
             return self._refuse("foreign")
-        writes = self.writes if self.session else 0
-        if len(words) != layout.REQUEST_WORDS + writes + layout.REQUEST_END_WORDS + 1:
+        if len(words) != layout.REQUEST_WORDS + self.writes + layout.REQUEST_END_WORDS + 1:
             return self._refuse("wrong_length")
         if not 0 < (words[1] - self.sequence) % WORD < WORD // 2:
             return self._refuse("replayed")
         self.sequence, self.heard_at = words[1], self.time
         identity = layout.KIND_REPLY | self.session << 8
-        for n, value in enumerate(words[layout.REQUEST_WORDS : layout.REQUEST_WORDS + writes]):
+        for n, value in enumerate(words[layout.REQUEST_WORDS : layout.REQUEST_WORDS + self.writes]):
             self.write(self.lists[n] & 0xFFFF, value)
-        reads = self.reads if self.session else 0
-        values = [self.read(self.lists[n] >> 16) for n in range(reads)]
+        values = [self.read(self.lists[n] >> 16) for n in range(self.reads)]
         spare, spare_value = words[-3], words[-2]
-        read = 0
+        read = 0 if spare >> 31 else self.read(spare & 0xFFFF)
         if spare >> 31:
-            self._set_up(spare & 0xFFFF, spare_value)
-        else:
-            read = self.read(spare & 0xFFFF)
+            self.write(spare & 0xFFFF, spare_value)
         counts = sum((count % 256) << 8 * n for n, count in enumerate(self.refused))
         content = [identity, words[1], self.time % WORD, counts % WORD, counts >> 32, *values, read]
         body = struct.pack(f"<{len(content)}I", *content)
@@ -345,20 +343,33 @@ class IdealNode:
         self.words = {}
         self.refused = [0] * len(layout.CAUSES)
         for axis in self.axes:
-            axis.__init__(position=axis.position)  # type: ignore[misc]
+            axis.__init__(position=axis.position)
 
     def _refuse(self, cause: str) -> None:
         names = [name for name, _ in layout.CAUSES]
         self.refused[names.index(cause)] += 1
 
-    def _set_up(self, at: int, value: int) -> None:
-        base = 0x1C00
-        if at == base:
-            self.session, self.sequence = value, 0
-        elif at == base + 4:
-            self.writes, self.reads = value & 0xFF, value >> 8 & 0xFF
-        elif at >= base + 0x200:
-            self.lists[(at - base - 0x200) // 4] = value
+    def write_named(self, name: str, **fields: int) -> None:
+        """Writes a register as a client of the bus would: those of the link are the set-up."""
+        if name == "link.lists":
+            self.writes, self.reads = fields["writes"], fields["reads"]
+        elif name == "link.entry":
+            self.lists[self.entry] = fields["write"] | fields["read"] << 16
+        elif name == "link.entry_number":
+            self.entry = fields["value"]
+        elif name == "link.session":
+            self.drawn = fields["value"]
+        elif name == "link.enable":
+            self.session, self.sequence = self.drawn * fields["value"], 0
+            self.heard_at = self.time
+
+    def read_named(self, name: str) -> dict[str, int]:
+        """Reads a register as a client of the bus would."""
+        if name == "node.build":
+            return {"axes": len(self.axes)}
+        assert name == "link.state"
+        on = self.session != 0
+        return {"built": 1, "on": on, "expired": on and self.expired, "session": self.session}
 
 
 class Served(threading.Thread):
@@ -391,11 +402,8 @@ class Served(threading.Thread):
             for event in [event for event in self.events if event[0](self.node)]:
                 self.events.remove(event)
                 event[1](self.node)
-            in_session = self.node.session
-            lost = self.lose(self.node)
-            reply = None if lost else self.node.answer(packet)
-            if in_session:
-                self.node.advance(PERIOD_CYCLES)
+            reply = None if self.lose(self.node) else self.node.answer(packet)
+            self.node.advance(PERIOD_CYCLES)
             self.socket.sendto(reply or LOST, host)
 
     def __enter__(self) -> "Served":

@@ -86,8 +86,9 @@ def test_a_netlist_is_made_once_and_again_after_a_change(tmp_path, monkeypatch):
 def test_a_wrong_family_a_wrong_parameter_and_a_wrong_source_are_errors(tmp_path, monkeypatch):
     monkeypatch.setattr(netlist, "BUILD", tmp_path / "netlist")
     source = ROOT / "rtl" / "common" / "synchroniser.sv"
-    with pytest.raises(netlist.NetlistError, match="it is one of ecp5, ice40"):
-        netlist.sources("gowin", source, {}, rtl_path())
+    for family in ("xc7", ""):
+        with pytest.raises(netlist.NetlistError, match="it is one of ecp5, ice40, gowin"):
+            netlist.sources(family, source, {}, rtl_path())
     with pytest.raises(netlist.NetlistError, match="STAGES_MUST_BE_AT_LEAST_2"):
         netlist.sources("ice40", source, {"STAGES": 1}, rtl_path())
     assert not list((tmp_path / "netlist" / "ice40").glob("*")), "nothing is kept of a failure"

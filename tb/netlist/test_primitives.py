@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Our models of the primitives of the ECP5 that Yosys has none of: memories of every width of the
-block RAM, with their first contents, and products, as Yosys maps them, against plain integers.
+"""Our models of the primitives of ECP5 and Gowin parts that Yosys has none of: memories of every
+width of the block RAM, with their first contents, and products, as Yosys maps them, against plain
+integers.
 """
 
 import random
@@ -60,24 +61,38 @@ async def products_are_exact(dut):
         assert dut.signed_product.value.to_signed() == signed_a * signed_b
 
 
-def primitive_is_used(name):
-    made = [path for path in netlist.BUILD.glob("ecp5/*_bench-*/netlist.v")]
+def primitive_is_used(name, family="ecp5"):
+    made = [path for path in netlist.BUILD.glob(f"{family}/*_bench-*/netlist.v")]
     return any(f"  {name} " in path.read_text() for path in made)
+
+
+def block_ram(w, family, monkeypatch):
+    """The memory of w bits on the netlist of a family."""
+    monkeypatch.setenv("NETLIST", family)
+    file = ROOT / "build" / f"block_ram_{family}_{w}.hex"
+    file.write_text("".join(f"{word:x}\n" for word in contents(w, WORDS_OF[w])))
+    run("block_ram_bench", __file__, W=w, DEPTH=WORDS_OF[w], CONTENTS=str(file))
 
 
 @pytest.mark.parametrize("w", WORDS_OF)
 def test_block_ram(w, monkeypatch):
-    monkeypatch.setenv("NETLIST", "ecp5")
-    file = ROOT / "build" / f"block_ram_{w}.hex"
-    file.write_text("".join(f"{word:x}\n" for word in contents(w, WORDS_OF[w])))
-    run("block_ram_bench", __file__, W=w, DEPTH=WORDS_OF[w], CONTENTS=str(file))
+    block_ram(w, "ecp5", monkeypatch)
     assert primitive_is_used("DP16KD")
 
 
-def test_multiplier(monkeypatch):
-    monkeypatch.setenv("NETLIST", "ecp5")
+@pytest.mark.parametrize(
+    "w, primitive", [(1, "DPB"), (4, "DPB"), (9, "DPX9B"), (18, "DPX9B"), (36, "SDPX9B")]
+)
+def test_block_ram_of_a_gowin_part(w, primitive, monkeypatch):
+    block_ram(w, "gowin", monkeypatch)
+    assert primitive_is_used(primitive, "gowin")
+
+
+@pytest.mark.parametrize("family, primitive", [("ecp5", "MULT18X18D"), ("gowin", "MULT18X18")])
+def test_multiplier(family, primitive, monkeypatch):
+    monkeypatch.setenv("NETLIST", family)
     run("multiplier_bench", __file__)
-    assert primitive_is_used("MULT18X18D")
+    assert primitive_is_used(primitive, family)
 
 
 COLLISION = """

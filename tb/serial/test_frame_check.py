@@ -198,12 +198,21 @@ def with_remainder_off(words, bit):
     ]
 
 
+def with_crc_off(words, bit):
+    """The words with one bit of the CRC flipped."""
+    data, command = words[bit // 8 - 4]
+    words = list(words)
+    words[bit // 8 - 4] = data ^ 1 << bit % 8, command
+    return words
+
+
 @cocotb.test()
-async def each_of_the_32_bits_of_the_remainder_is_compared(dut):
+async def each_of_the_32_bits_of_the_crc_and_of_the_remainder_is_compared(dut):
     bus = await begin(dut)
     for bit in range(32):
         words = frame(0x25, random.randbytes(random.choice((1, 5, 64))))
-        assert (await bus.send(with_remainder_off(words, bit)))[1:] == (0, 1), f"bit {bit}"
+        for wrong in (with_crc_off(words, bit), with_remainder_off(words, bit)):
+            assert (await bus.send(wrong))[1:] == (0, 1), f"bit {bit}"
         assert (await bus.send(words))[1:] == (1, 0)
 
 

@@ -21,6 +21,7 @@ from amaranth_boards.ulx3s import ULX3S_25F_Platform, ULX3S_85F_Platform
 from boards import board, build, clocks, generate, machine, size
 from boards.fit import fit
 from boards.toml_file import Misfit
+from figures import boards as figures_of_boards
 from figures import synthesis
 from figures.boards import boards_failed
 from figures.synthesis import SynthesisError
@@ -101,7 +102,9 @@ PINS = {  # the place of a port, and where its level and pull-up are, in each ki
 
 @pytest.mark.parametrize("design", DESIGNS, ids=lambda design: design.name)
 def test_each_port_of_the_top_has_a_pin_of_its_own(design):
-    ports = re.findall(r"^    (?:input  wire |output logic) (\w+)", generate.top(design), re.M)
+    ports = re.findall(
+        r"^    (?:input  wire |output logic|inout  wire ) (\w+)", generate.top(design), re.M
+    )
     name = design.board.part.family.constraints
     made = generate.files(design)[name]
     located, given = PINS[name]
@@ -120,7 +123,7 @@ def test_page_and_drawing_name_each_connection(design):
         assert f">{one.name}</text>" in made["wiring.svg"]
         assert f">{one.between.part}</text>" in made["wiring.svg"]
     assert made["wiring.svg"] in made["wiring.html"]
-    drawn = re.findall(r'<g class="(in|out)">', made["wiring.svg"])
+    drawn = re.findall(r'<g class="(in|out|both)">', made["wiring.svg"])
     assert drawn.count("in") == sum(one.signal.direction == "in" for one in design.connections)
     assert len(drawn) == len(design.connections)
 
@@ -165,6 +168,84 @@ def test_a_relay_has_the_coefficients_of_the_flash_and_no_firmware(tmp_path):
     assert "assign flash_mosi = node_flash_sdo;" in top and ".flash_sdi(flash_miso)" in top
     assert build.make_firmware(design, tmp_path) == "relay has no firmware"
     assert not list(tmp_path.iterdir())
+
+
+PAPERS = ("S0:", "S1:", "S2 and", "S3:", "S4: main node", "S4: sub-node")  # titles begin so
+
+
+def test_the_machine_of_each_paper_is_on_a_board():
+    titles = [design.machine.title for design in DESIGNS]
+    for paper in PAPERS:
+        assert any(title.startswith(paper) for title in titles), paper
+
+
+def test_lines_that_a_node_only_pulls_low_are_open_drain():
+    made = generate.files(fit(board.named("colorlight_i5"), machine.named("s4_main")))
+    assert "    inout  wire  i2c_scl,  // P2A 1: clock of the I2C bus\n" in made["top.sv"]
+    assert "assign i2c_scl = node_i2c_scl_low ? 1'b0 : 1'bz;" in made["top.sv"]
+    assert ".i2c_scl(i2c_scl)," in made["top.sv"]
+    assert ".edm_status({edm_alarm, edm_cutting})" in made["top.sv"]
+    assert 'IOBUF PORT "i2c_scl" PULLMODE=UP IO_TYPE=LVCMOS33' in made["pins.lpf"]
+    assert "<td>to and from the board: clock of the I2C bus</td>" in made["wiring.html"]
+
+
+def test_peripherals_that_a_machine_does_not_have_are_idle():
+    given = generate.inputs(fit(board.named("colorlight_i5"), machine.named("s4_sub")))
+    assert (given["keyboard_clock"], given["edm_status"]) == ("1'b1", "{1'b0, 1'b0}")
+    assert (given["sensor_rx"], given["peer_rx"]) == ("sensor_rx", "peer_rx")
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ('"angle_sensor"]', '"angle"]', "[node] peripherals: 'angle' is none of i2c, ps2, peer, "),
+        (
+            'peripherals = ["i2c", "peer", "angle_sensor"]',
+            'peripherals = ["i2c", "peer"]',
+            "sensor_rx is no signal of this machine, or it is in `unused`",
+        ),
+        (
+            '2.2 kilohm to 3.3 V at each line"\nvolts = 3.3',
+            '2.2 kilohm to 5 V at each line"\nvolts = 5.0',
+            "i2c_scl comes with 5 V, but J1 gp0 of constraints/ulx3s_25f/board.toml takes 3.3 V",
+        ),
+    ],
+)
+def test_wrong_peripherals_are_refused(old, new, words, tmp_path):
+    path = edited(tmp_path, "constraints/machines/s4_sub.toml", (old, new))
+    found = refusal(lambda: fit(board.named("ulx3s_25f"), machine.load(path)))
+    assert found.startswith(f"{path}: ") and words in found
+
+
+def test_an_open_drain_line_needs_a_pin_for_both_directions(tmp_path):
+    path = edited(
+        tmp_path,
+        "constraints/machines/s4_sub.toml",
+        ("[wiring.ulx3s]", "[wiring.tang_nano_20k]"),
+        ('i2c_scl = "J1 gp0"', 'i2c_scl = "LED 15"'),
+    )
+    pins = (f'"J5 {pin}"' for pin in (76, 42, 41, 56, 54, 51, 48, 55, 49, 86, 79, 72))
+    text = re.sub(r'"J[12] g[pn]\d+"', lambda _: next(pins), path.read_text())
+    path.write_text(text)
+    found = refusal(lambda: fit(board.named("tang_nano_20k"), machine.load(path)))
+    assert found == (
+        f"{path}: i2c_scl is an input and output, but LED 15 of "
+        "constraints/tang_nano_20k/board.toml is an output only"
+    )
+
+
+def test_the_page_describes_the_loop_back_plug_of_axes_with_drives():
+    mill = fit(board.named("ulx3s_85f"), machine.named("mill"))
+    wires = generate.plug(mill)
+    assert wires[0] == ("GND", "J2 gn20") and len(wires) == 1 + 3 * 5
+    assert ("J1 gn3", "J1 gp0") in wires and ("J1 gp3", "J1 gp1") in wires
+    page = generate.files(mill)["wiring.html"]
+    assert "<tr><td>J1 gn3</td><td>J1 gp0</td></tr>" in page
+    s3 = fit(board.named("colorlight_i5"), machine.named("s3"))
+    assert {start for start, _ in generate.plug(s3)} == {"GND", "P3A 1"}
+    box = fit(board.named("icebreaker"), machine.named("counter_box"))
+    assert not generate.plug(box)
+    assert "Loop-back" not in generate.files(box)["wiring.html"]
 
 
 def test_signals_that_a_layout_leaves_out_are_on_its_page():
@@ -271,6 +352,10 @@ def no_way(*_):
     raise SynthesisError("no way")
 
 
+def no_more(*_):
+    raise AssertionError("it is placed again")
+
+
 @pytest.mark.parametrize(
     "place, failed",
     [
@@ -280,7 +365,7 @@ def no_way(*_):
     ],
 )
 def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
-    place, failed, monkeypatch
+    place, failed, monkeypatch, tmp_path
 ):
     """Of four builds: one reaches 18 MHz but not 48 or 27, one needs no placement."""
     names = ("icebreaker", "ice40_hx8k_evn", "tang_nano_9k", "arty_a7_35t")
@@ -289,7 +374,13 @@ def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
     for name in ("check_tools", "write", "make_firmware", "synthesise", "pack"):
         monkeypatch.setattr(build, name, lambda *_: Path("none"))
     monkeypatch.setattr(build, "place", place)
+    monkeypatch.setattr(figures_of_boards, "RESULTS", tmp_path)
     assert boards_failed() == failed
+    monkeypatch.setattr(build, "place", no_more)  # each placement was kept
+    assert boards_failed() == failed
+    monkeypatch.setattr(build, "state", lambda design: design.name)  # something has changed
+    with pytest.raises(AssertionError):
+        boards_failed()
 
 
 # Clocks and sizes
@@ -329,6 +420,7 @@ def test_the_costs_of_features_are_those_that_the_page_lists():
     for name, lut in size.FEATURES.items():
         assert int(rows[words.get(name, name)]) == lut, name
     assert int(rows["step generator"]) == size.STEPPER
+    assert f"take {size.PERIPHERALS} LUT4" in (ROOT / "docs" / "peripherals.md").read_text()
     assert str(size.STEP_NODE) in rows.values() and str(size.SINE_NODE) in rows.values()
     assert str(size.STEP_AXIS) in rows.values() and str(size.SINE_AXIS) in rows.values()
 

@@ -3,9 +3,11 @@
 
 import pytest
 
+from tb.wiring.axis_inputs import AxisInputs
 from tb.wiring.display_port import DisplayPort
 from tb.wiring.node import Node
 from tb.wiring.peripherals import Peripherals
+from tb.wiring.process_link import ProcessLink
 from tb.wiring.relay import Relay
 
 
@@ -37,5 +39,21 @@ def relay():
 def display_port():
     """The port of the display after its reset."""
     made = DisplayPort()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def process_link():
+    """The real-time link before its reset."""
+    made = ProcessLink()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def axis_inputs():
+    """The inputs of an axis before their reset."""
+    made = AxisInputs()
     yield made
     made.close()

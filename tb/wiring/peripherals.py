@@ -26,12 +26,17 @@ class Peripherals(Bench):
         self.eeprom, self.keyboard = Eeprom(write_clk=5 * MS), Keyboard(CLK_HZ)
         self.machine, self.stuck = Host(CLK_HZ), (0, 0)
         self.active = set()
-        self.set(rst=1, peer_rx=1, sensor_rx=1, **dict.fromkeys(LINES, 1))
-        self.run(4)
-        self.set(rst=0)
+        self.set(**dict.fromkeys(LINES, 1))
+        self.reset()
         self.run(10)
         self.write("peer_bit_time", value=16 * BIT)
         self.write("sensor_bit_time", value=16 * BIT)
+
+    def reset(self, level=1):
+        """A reset, with this level on both serial inputs."""
+        self.set(rst=1, peer_rx=level, sensor_rx=level)
+        self.run(4)
+        self.set(rst=0)
 
     def clk(self, cycles=1):
         """So many cycles, with the active devices."""
@@ -101,10 +106,10 @@ class Peripherals(Bench):
             self.clk(2)
         raise AssertionError("the queue of results does not become empty")
 
-    def send(self, pin, data, stop=1):
+    def send(self, pin, data, stop=1, bit=BIT):
         """Characters on a serial input."""
         for byte in data:
             for level in (0, *(byte >> n & 1 for n in range(8)), stop):
                 self.set(**{pin: level})
-                self.clk(BIT)
+                self.clk(bit)
             self.set(**{pin: 1})

@@ -96,6 +96,19 @@ def test_a_limit_switch_stops_its_axis_and_its_position_is_latched(node, axis):
         assert node.get("drive_enable") == 3
 
 
+def test_a_limit_switch_that_bounces_does_not_stop_its_axis(node):
+    both_on(node)
+    for pin in ("limit_low_open", "limit_high_open"):
+        for axis in (0, 1):
+            node.set_bit(pin, axis, 1)
+            node.run(LIMIT // 3)
+            assert not node.bits("axis.state", axis) & {"limit_low", "limit_high"}
+            node.set_bit(pin, axis, 0)
+            node.run(LIMIT)
+    assert node.get("drive_enable") == 3
+    assert not node.bits("axis.faults", 0) | node.bits("axis.faults", 1)
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 def test_while_homing_a_limit_switch_is_no_fault(node, axis):
     both_on(node)

@@ -213,10 +213,45 @@ def test_the_bit_times_of_the_two_serial_ports_are_their_own(peripherals):
     peripherals.write("peer_bit_time", value=16 * 2 * BIT)
     peripherals.send("sensor_rx", frame(3, 99))
     assert peripherals.read("sensor_state") == dict(sequence_number=3, stale=0)
-    for level in (0, *(0x69 >> n & 1 for n in range(8)), 1):
-        peripherals.set(peer_rx=level)
-        peripherals.clk(2 * BIT)
+    peripherals.send("peer_rx", [0x69], bit=2 * BIT)
     assert peripherals.read("peer_receive") == dict(data=0x69, present=1)
+
+
+def test_a_reset_in_the_middle_of_a_character_ends_it(peripherals):
+    for pin, data in (("peer_rx", [0xA5]), ("sensor_rx", frame(5, 77))):
+        peripherals.set(**{pin: 0})
+        peripherals.clk(3 * BIT)
+        peripherals.reset()
+        for port in ("peer", "sensor"):
+            peripherals.write(f"{port}_bit_time", value=16 * BIT)
+        peripherals.send(pin, data)
+        if pin == "peer_rx":
+            assert peripherals.read("peer_receive") == dict(data=0xA5, present=1)
+    assert peripherals.read("sensor_state") == dict(sequence_number=5, stale=0)
+
+
+def test_a_serial_line_counts_as_idle_during_a_reset(peripherals):
+    """A level that is low then and afterwards is a start bit."""
+    bit = 35  # cycles, the setting after a reset
+    peripherals.reset(level=0)
+    peripherals.set(sensor_rx=1)
+    peripherals.send("peer_rx", [0xFF], bit=bit)
+    assert peripherals.read("peer_receive") == dict(data=0xFF, present=1)
+    peripherals.reset(level=0)
+    peripherals.set(peer_rx=1)
+    peripherals.send("sensor_rx", frame(5, 77), bit=bit)
+    assert peripherals.read("sensor_state") == dict(sequence_number=5, stale=0)
+
+
+def test_a_byte_of_a_frame_without_a_stop_bit_breaks_it(peripherals):
+    peripherals.write("sensor_gap", value=50 * BIT)
+    good = frame(5, 77)
+    peripherals.send("sensor_rx", good[:3])
+    peripherals.send("sensor_rx", good[3:4], stop=0)
+    peripherals.clk(2 * BIT)
+    assert peripherals.read("sensor_errors") == dict(crc=0, broken=1, missed=0)
+    peripherals.send("sensor_rx", good)
+    assert peripherals.read("sensor_state") == dict(sequence_number=5, stale=0)
 
 
 def test_an_angle_its_age_and_its_number_are_read(peripherals):

@@ -122,6 +122,7 @@ static const struct moire_pin AXIS_PINS[] = {
 #define CAUSE_STEP_OVERRUN 10u
 #define CAUSE_SERVO_OVERRUN 11u
 #define CAUSE_SAMPLE_OVERRUN 12u
+#define CAUSE_LINK_WATCHDOG 13u
 #define CAUSE_LINK_LOST 32u
 #define CAUSE_WATCHDOG 33u
 #define CAUSE_NOT_ENABLED 34u
@@ -144,6 +145,7 @@ static const char* const CAUSE_TEXTS[] = {
     [10] = "too many steps are pending: too fast for the step timing, or blocked",
     [11] = "a servo tick came before the motion engine had served the last one",
     [12] = "a sample came before the shared interpolation chain had served the last one",
+    [13] = "no good packet came over the real-time link in time",
     [32] = "packets were lost for too long",
     [33] = "the watchdog of the link has expired",
     [34] = "the drive did not switch on in time",

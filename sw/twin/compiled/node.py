@@ -445,6 +445,69 @@ class FeedbackChannel:
                 self.points, self.written, self.loads = self.written, {}, self.loads + 1
 
 
+class TickScope:
+    """The recorder of ticks and the excitation, by the registers of the node."""
+
+    SIGNALS = 6  # that can be recorded
+
+    def __init__(self, words: int) -> None:
+        self.size = words
+        self.word: dict[int, int] = {}
+        self.waveform: dict[int, int] = {}
+        self.recorded: list[int] = []
+        self.recording = self.full = False
+        self.taken = self.passed = 0
+
+    def field(self, name: str) -> int:
+        """A field of a setting, by its name in the header of the registers."""
+        register = next(d for d in ("SCOPE_SAMPLES", "SCOPE", "EXCITATION") if name.startswith(d))
+        value = self.word.get(DEFINES[f"NODE_{register}"], 0)
+        return (value & DEFINES[f"NODE_{name}_MASK"]) >> DEFINES[f"NODE_{name}_SHIFT"]
+
+    def write(self, offset: int, value: int) -> None:
+        """Write a register of the node."""
+        self.word[offset] = value
+        if offset == DEFINES["NODE_EXCITATION_VALUE"]:
+            self.waveform[value >> 16 & 0xFFF] = signed(value & 0xFFFF, 16)
+        if offset == DEFINES["NODE_SCOPE_STATE"] and value & 1:
+            self.recorded, self.recording, self.full = [], True, False
+            self.taken = self.passed = 0
+
+    def read(self, offset: int) -> int | None:
+        """A register of the node; None if it is not one of these."""
+        if offset == DEFINES["NODE_SCOPE_STATE"]:
+            return self.recording << 1 | self.full << 2
+        if offset == DEFINES["NODE_SCOPE_WORD"]:
+            assert self.full, "a word was read that is not there"
+            self.taken += 1
+            return self.recorded[(self.taken - 1) % len(self.recorded)]
+        return None
+
+    def tick(self, axes: Sequence["Axis"]) -> None:
+        """A servo tick has passed."""
+        if not self.recording:
+            return
+        self.passed += 1
+        if self.passed < self.field("SCOPE_SAMPLES_EVERY"):
+            return
+        self.passed = 0
+        axis, d = axes[self.field("SCOPE_AXIS")], DEFINES
+        chosen = self.field("SCOPE_SIGNALS")
+        values = (
+            axis.word.get(d["AXIS_SAMPLE"], 0),
+            axis.target,
+            0,
+            axis.speed,
+            axis.error,
+            axis.word.get(d["AXIS_COMMAND"], 0),
+        )
+        self.recorded += [
+            value & 0xFFFFFFFF for bit, value in enumerate(values) if chosen >> bit & 1
+        ]
+        if len(self.recorded) == self.field("SCOPE_SAMPLES_LENGTH") * chosen.bit_count():
+            self.recording, self.full = False, True
+
+
 class FlashPort(Protocol):
     """The port of a serial core to its flash, behind the register map."""
 
@@ -480,10 +543,11 @@ class CompiledNode:
         peripherals: Peripherals | None = None,
         absent: Sequence[str] = (),
         flash: FlashPort | None = None,
+        scope_words: int = 0,
     ) -> None:
         """Power up. `absent` names what is not built, as in the register axis.built; a
         `map_crc` other than that of the firmware is a bitstream that does not fit it. A node with
-        a `flash` has the serial core.
+        a `flash` has the serial core. `scope_words` is the memory of its recorder of ticks.
         """
         self.axes, self.address, self.map_crc, self.clk = (
             list(axes) or [Axis()],
@@ -500,7 +564,7 @@ class CompiledNode:
             self.built &= ~DEFINES[f"AXIS_BUILT_{name.upper()}_MASK"]
         self.feedback_channels = [FeedbackChannel() for _ in self.axes]
         self.actuators: list[dict[int, int]] = [{} for _ in self.axes]  # words by their offset
-        self.peripherals, self.flash = peripherals, flash
+        self.peripherals, self.flash, self.scope = peripherals, flash, TickScope(scope_words)
         self.received: deque[int] = deque()
         self.sent: list[int] = []
         self.word: dict[int, int] = {}
@@ -548,7 +612,15 @@ class CompiledNode:
             if offset == d["BUS_CRC"]:
                 return zlib.crc32(self.crc_bytes)
             return self.word.get(d["BUS_BASE"] + offset, 0)
-        build = len(self.axes) | self.address << 4 | 64 << 8
+        live = self.scope.read(offset)
+        if live is not None:
+            return live
+        build = (
+            len(self.axes)
+            | self.address << 4
+            | 64 << 8
+            | self.scope.size // 256 << d["NODE_BUILD_SCOPE_SHIFT"]
+        )
         return {
             d["NODE_MAP_CRC"]: self.map_crc,
             d["NODE_CLK_HZ"]: CLK_HZ,
@@ -592,6 +664,7 @@ class CompiledNode:
             self.crc_bytes += bytes([value])
         else:
             self.word[offset] = value
+            self.scope.write(offset, value)
             if offset == d["NODE_START_AXES"]:
                 self.start_axes(value)
 
@@ -625,6 +698,7 @@ class CompiledNode:
                     axis.tick()
                     if axis.passed is not None:
                         channel.index(self.clk, axis.passed)
+                self.scope.tick(self.axes)
             self.clk += CLK_HZ // 1000
             if self.peripherals:
                 self.peripherals.millisecond(self)

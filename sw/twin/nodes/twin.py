@@ -72,8 +72,8 @@ NODE = {**drives("HAS_BRIDGE"), "FILTERS": 0}  # what the stage of S0 needs of r
 WITH_SEGMENTS = {
     **NODE,
     "SEGMENTS": 255,
-    "SCOPE_WORDS": 16384,
 }  # and with its segment table, which takes a fifteenth of the speed
+WITH_SCOPE = {**WITH_SEGMENTS, "FILTERS": 2, "SCOPE_WORDS": 16384}  # and with all to tune its servo
 BAUD = 115200
 BREAK_S = 0.003  # the line low; nodes want 2 ms
 # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
@@ -190,10 +190,14 @@ class LinkLine:
 
 
 def library(
-    clk_hz: int, axes: int, words: Sequence[int], node: Mapping[str, int] | None = None
+    clk_hz: int,
+    axes: int,
+    words: Sequence[int],
+    node: Mapping[str, int | str] | None = None,
+    netlist: str | None = None,
 ) -> ctypes.CDLL:
     """The library of a build, with its functions declared."""
-    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node, words)))
+    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node, words, netlist)))
     declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **DEVICES_FUNCTIONS, **PEER_FUNCTIONS})
     return found
 
@@ -222,7 +226,8 @@ class Twin:
     one in sw/firmware. `host_baud_error` 0.02 makes the host 2 % fast. `node_parameters` {"W": 12}
     are parameters of rtl/node.sv, drives(*DRIVES) builds all actuators, WITH_SEGMENTS a segment
     table. All nodes have all peripherals if one of them has devices or peers; `peers` are the
-    numbers of two nodes that a serial line connects.
+    numbers of two nodes that a serial line connects. `netlist` is a family of FPGAs (ecp5, ice40,
+    gowin), perhaps with options of its synthesis: the nodes are then the netlists of it.
     """
 
     def __init__(
@@ -236,9 +241,10 @@ class Twin:
         plant: Mapping[str, float] | None = None,
         plant_of: Mapping[int, Mapping[str, float]] | None = None,
         firmware: Sequence[int] | None = None,
-        node_parameters: Mapping[str, int] = NODE,
+        node_parameters: Mapping[str, int | str] = NODE,
         peers: tuple[int, int] | None = None,
         peer_baud: float = PEER_BAUD,
+        netlist: str | None = None,
     ) -> None:
         self.handle: int | None = None
         built = [node if isinstance(node, Node) else Node(node, [Axis()] * axes) for node in nodes]
@@ -256,7 +262,7 @@ class Twin:
         ]
         words = build.firmware(axes=self.node_axes) if firmware is None else firmware
         self.library, self.clk_hz, self.baud = (
-            library(clk_hz, self.node_axes, words, node_parameters),
+            library(clk_hz, self.node_axes, words, node_parameters, netlist),
             clk_hz,
             baud,
         )

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The measured frequency response of an axis in closed loop: plant, open loop and closed loop.
 
-    response = measure(axis, multisine(tick_s))      # the axis moves slowly and evenly meanwhile
+    response = measure(axis)                         # the axis moves slowly and evenly meanwhile
     plant = fit(response)                            # a plant of moire.analysis.tune
     Path("response.png").write_bytes(picture(response, plant, tuning))
 
@@ -23,6 +23,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
@@ -45,15 +46,17 @@ from moire.client.axis import Axis
 Array = NDArray[numpy.float64]
 Complex = NDArray[numpy.complex128]
 
-PERIOD = 4096  # ticks of the multisine
+PERIOD = 4096  # ticks of the multisine of low frequencies
 LINES = 140  # frequencies of it, fewer where whole periods leave fewer
+LOW_LINES = 40  # of that of the low frequencies
 LOWEST_HZ = 1.0
+SPLIT_HZ = 20.0  # below this the multisine has its full period, above it a quarter
 HIGHEST_SHARE = 0.2  # of the tick rate
 PEAK = "15%"  # of full scale, of the multisine
 FLATTENINGS = 300  # steps that lower its crest factor
 CUTS = 0.3, 0.9  # of the peak, in the first and in the last of these steps
 PERIODS = 2  # of a record
-RECORDS = 3
+RECORDS = 2
 SPEED_PERIODS = 0.625  # signal periods of the scale in a tick: away from all that is measured
 LEAST_COHERENCE = 0.8
 CLEAR_ERROR = 0.02  # relative standard error of a point that counts half in a fit
@@ -62,7 +65,8 @@ SIGNALS = ("error", "command")
 STARTING_S = 0.1  # until the axis moves evenly
 LEAST_SENSITIVITY = 0.1  # share of the excitation that the loop must leave
 SOFT_BANDWIDTH = 6.0  # of the slower loop, in lowest frequencies
-MOST_OF_THE_SPEED = 0.5  # that the excitation of the slower loop may take
+MOST_OF_THE_SPEED = 0.3  # that the excitation of the slower loop may take
+SAMPLES_OF_A_CYCLE = 4  # of the highest frequency, at least, where fewer samples are recorded
 SETTLING_PERIODS = 1  # of the multisine, until its response is periodic
 MODE_GAIN = 0.5  # a mode is one if it leaves less than this share of the squares
 
@@ -90,12 +94,18 @@ class Excitation:
         rms = float(numpy.sqrt(numpy.mean(self.values.astype(float) ** 2)))
         return float(numpy.abs(self.values).max()) / rms
 
-    def spectrum(self, signal: ArrayLike) -> Complex:
+    @property
+    def sparse(self) -> int:
+        """Ticks from sample to sample that suffice to record the response; a power of two."""
+        most = len(self.values) / (SAMPLES_OF_A_CYCLE * float(self.lines[-1]))
+        return max(1, 1 << int(math.log2(max(most, 1.0))))
+
+    def spectrum(self, signal: ArrayLike, every: int = 1) -> Complex:
         """The signal at the frequencies of the excitation: amplitude and phase of each period.
 
-        A row for each whole period of the signal.
+        A row for each whole period of the signal, which has a value in `every` ticks.
         """
-        rows = numpy.asarray(signal, float).reshape(-1, len(self.values))
+        rows = numpy.asarray(signal, float).reshape(-1, len(self.values) // every)
         return numpy.asarray(numpy.fft.rfft(rows, axis=1)[:, self.lines] * 2 / rows.shape[1])
 
 
@@ -203,9 +213,14 @@ def coherent_share(rows: Complex) -> Array:
 
 
 def computed(
-    excitation: Excitation, errors: ArrayLike, commands: ArrayLike, period_nm: float
+    excitation: Excitation,
+    errors: ArrayLike,
+    commands: ArrayLike,
+    period_nm: float,
+    every: int = 1,
 ) -> Response:
-    """The response, from error and command at each tick: a row for each record of whole periods.
+    """The response, from error and command at each tick, or at one in `every`: a row for each
+    record of whole periods.
 
     Error and command belong to one tick, and each record begins with the first value of the
     excitation. Raises NotTuned where the command was at its limit or the axis did not respond.
@@ -213,16 +228,16 @@ def computed(
     error_rows, command_rows = (
         numpy.atleast_2d(numpy.asarray(rows, float)) for rows in (errors, commands)
     )
-    length = len(excitation.values)
+    length = len(excitation.values) // every
     if error_rows.shape != command_rows.shape or error_rows.shape[1] % length:
         raise NotTuned(
             f"{error_rows.shape[1]} errors and {command_rows.shape[1]} commands: a record has one "
-            f"of each at every tick of whole periods of {length} ticks"
+            f"of each at every sample of whole periods of {length} samples"
         )
     if numpy.ptp(error_rows) == 0:
         raise NotTuned("no motion: the error did not change; is the drive on?")
-    y = -excitation.spectrum(level(error_rows, length))
-    u = excitation.spectrum(command_rows)
+    y = -excitation.spectrum(level(error_rows, length), every)
+    u = excitation.spectrum(command_rows, every)
     d = excitation.spectrum(excitation.values)[0]
     count = len(y)
     mean_y, mean_u = y.mean(axis=0), u.mean(axis=0)
@@ -286,23 +301,28 @@ def speed_nm_s(axis: Axis) -> float:
 
 def measure(
     axis: Axis,
-    excitation: Excitation,
+    peak: units.Value = PEAK,
     speed: units.Number | None = None,
     records: int = RECORDS,
+    low_hz: float = LOWEST_HZ,
+    high_hz: float | None = None,
     progress: Callable[[int, int], object] = lambda done, records: None,
 ) -> Response:
     """The response of an axis, which must be enabled, homed and at rest, by some records.
 
     Meanwhile the axis moves to and fro at `speed` (nm/s; None: speed_nm_s(); 0: it stays), so that
-    friction does not change its sign. The loop suppresses low frequencies of the excitation; where
-    less than LEAST_SENSITIVITY of it is left, the plant is measured again with smaller gains.
-    `progress` gets the number of records done and their number. The axis has its own gains and
-    override again at the end, and does not move. Raises NotTuned, NotRecorded, OutOfRange or
-    Refused.
+    friction does not change its sign. Frequencies above SPLIT_HZ are measured first. The loop
+    suppresses what is lower than its bandwidth: the frequencies below SPLIT_HZ, and those of which
+    it leaves less than LEAST_SENSITIVITY, are measured with smaller gains.
+    `peak` is the largest value of the multisine, a share of full scale; `progress` gets the number
+    of records done and their number. The axis has its own gains and override again at the end, and
+    does not move. Raises NotTuned, NotRecorded, OutOfRange or Refused.
     """
+    tick_s = 1 / axis.node.identity.tick_hz
+    high = multisine(tick_s, max(low_hz, SPLIT_HZ), high_hz, peak, PERIOD // 4)
     wished = speed_nm_s(axis) if speed is None else float(speed)
     tuning = in_force(axis)
-    check_room(axis, excitation, records)
+    check_room(axis, high, wished, records)
     done = 0
 
     def one_more() -> None:
@@ -311,12 +331,11 @@ def measure(
         progress(done, 2 * records)
 
     def work() -> Response:
-        response = recorded(axis, excitation, wished, records, one_more)
-        slow = numpy.abs(response.sensitivity) < LEAST_SENSITIVITY
-        if not slow.any():
+        response = recorded(axis, high, wished, records, one_more)
+        low = low_band(response, high, low_hz, wished / float(axis.period_nm) * COUNTS)
+        if low is None:
             return response
-        low = low_band(response, slow, excitation, wished / (float(axis.period_nm) / COUNTS))
-        with softened(axis, tuning, softness(response)):
+        with softened(axis, tuning, softness(response, low_hz)):
             return joined(recorded(axis, low, wished, records, one_more), response, tuning)
 
     override = axis.override()
@@ -329,10 +348,10 @@ def measure(
         axis.override(override)
 
 
-def check_room(axis: Axis, excitation: Excitation, records: int) -> None:
-    """Raises NotTuned unless the node can record so much, and the command has room for the peak."""
+def check_room(axis: Axis, excitation: Excitation, speed_nm_s: float, records: int) -> None:
+    """Raises NotTuned unless axis and node can do this, and the command has room for the peak."""
     scope, length = TickScope(axis), len(excitation.values)
-    if not axis.status().homed:
+    if speed_nm_s and not axis.status().homed:
         raise NotTuned(
             "the axis has no zero yet, so its travel is not known: home it first, or measure with "
             "--speed 0mm/s or --method steps"
@@ -363,7 +382,7 @@ def recorded(
 ) -> Response:
     """The response by some records, each with a motion of its own."""
     scope, length = TickScope(axis), len(excitation.values)
-    period_s = length * excitation.tick_s
+    period_s, every = length * excitation.tick_s, excitation.sparse
     scope.load(excitation.values)
     errors, commands = [], []
     for number in range(records):
@@ -373,7 +392,7 @@ def recorded(
             axis.dwell(STARTING_S)
         with scope.excited(length):
             axis.dwell(SETTLING_PERIODS * period_s)
-            scope.start(SIGNALS, PERIODS * length)
+            scope.start(SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s))
             axis.dwell((PERIODS + 1) * period_s)
         if speed_nm_s:
             axis.stop_and_wait()
@@ -384,7 +403,7 @@ def recorded(
     limit = axis.get_parameter("output_limit").counts
     if float(numpy.mean(numpy.abs(commands) >= limit)) > SATURATED:
         raise NotTuned("the command was at its limit: use a smaller peak, or a slower motion")
-    return computed(excitation, errors, commands, float(axis.period_nm))
+    return computed(excitation, errors, commands, float(axis.period_nm), every)
 
 
 # low frequencies, which the loop suppresses
@@ -396,31 +415,28 @@ def crossover_hz(response: Response) -> float:
     return float(response.hz[above[-1] if above.size else 0])
 
 
-def softness(response: Response) -> float:
-    """The factor of the gains with which the loop lets the lowest frequency through."""
-    return min(1.0, SOFT_BANDWIDTH * float(response.hz[0]) / crossover_hz(response))
+def softness(response: Response, low_hz: float) -> float:
+    """The factor of the gains with which the loop lets this frequency through."""
+    return min(1.0, SOFT_BANDWIDTH * low_hz / crossover_hz(response))
 
 
 def low_band(
-    response: Response,
-    slow: NDArray[numpy.bool_],
-    excitation: Excitation,
-    speed_lsb_s: float,
-) -> Excitation:
-    """A multisine of the frequencies that the loop suppressed. Its peak does not stop a motion."""
-    seen = ~slow if (~slow).any() else slow
-    w = 2 * math.pi * response.hz[seen]
-    velocity = float(numpy.max(numpy.abs(response.plant[seen]) * w))  # LSB/s per command
-    peak = float(numpy.abs(excitation.values).max())
+    response: Response, high: Excitation, low_hz: float, speed_lsb_s: float
+) -> Excitation | None:
+    """A multisine of the low frequencies that are not measured yet; None if there are none.
+
+    Its peak does not stop a motion.
+    """
+    slow = response.hz[numpy.abs(response.sensitivity) < LEAST_SENSITIVITY]
+    top_hz = max([SPLIT_HZ, *(slow * 1.02)])
+    if low_hz >= top_hz:
+        return None
+    at = max(0, min(len(slow), len(response.hz) - 1))
+    velocity = float(numpy.abs(response.plant[at]) * 2 * math.pi * response.hz[at])
+    peak = float(numpy.abs(high.values).max())
     if speed_lsb_s:
         peak = min(peak, MOST_OF_THE_SPEED * speed_lsb_s / velocity)
-    return multisine(
-        excitation.tick_s,
-        float(response.hz[slow][0]),
-        float(response.hz[slow][-1]) * 1.001,
-        peak / FULL_SCALE,
-        len(excitation.values),
-    )
+    return multisine(high.tick_s, low_hz, top_hz, peak / FULL_SCALE, PERIOD, LOW_LINES)
 
 
 @contextmanager

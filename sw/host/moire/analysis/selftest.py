@@ -31,9 +31,16 @@ class Check(NamedTuple):
 
 
 def checks(node: Node) -> Iterator[Check]:
-    """Carries out one check after the other.
+    """Carries out one check after the other."""
+    yield from node_checks(node)
+    for number in range(node.identity.axes):
+        for check in axis_checks(node.axis(number)):
+            yield check._replace(name=f"axis {number} {check.name}")
 
-    That the node has the right build was checked when the Node was made.
+
+def node_checks(node: Node) -> Iterator[Check]:
+    """The checks of a node without its axes. That it has the right build was checked when the Node
+    was made.
     """
     identity = node.identity
     yield Check(
@@ -44,9 +51,6 @@ def checks(node: Node) -> Iterator[Check]:
     )
     yield bus_check(node)
     yield clock_check(node)
-    for number in range(identity.axes):
-        for check in axis_checks(node.axis(number)):
-            yield check._replace(name=f"axis {number} {check.name}")
 
 
 def bus_check(node: Node) -> Check:

@@ -13,6 +13,7 @@ command was computed from it. The node needs SCOPE_WORDS of rtl/node.sv; `moire.
 for the others.
 """
 
+import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ import numpy
 from numpy.typing import ArrayLike, NDArray
 
 from moire import units
+from moire.analysis import report
 from moire.client.access import COUNTS, FULL_SCALE
 from moire.client.axis import Axis
 from moire.client.names import code_name
@@ -37,7 +39,7 @@ WORDS_AT_ONCE = sum(field.startswith("word_") for field, _ in OPERATIONS["read_t
 VALUES_AT_ONCE = sum(
     field.startswith("value_") for field, _ in OPERATIONS["load_excitation"].request
 )
-BUILD = next(f for f in FIELDS if (f.block, f.register, f.field) == ("node", "build", "scope"))
+NODE_FIELDS = {f"{f.register}.{f.field}": f for f in FIELDS if f.block == "node"}
 
 
 class NotRecorded(MoireError):
@@ -85,6 +87,32 @@ class TickRecord:
         rows += [",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values())]
         return "\n".join(rows) + "\n"
 
+    def parquet(self) -> bytes:
+        """The record as Parquet, with the columns of the CSV; needs the package pyarrow."""
+        try:
+            import pyarrow
+            from pyarrow import parquet
+        except ImportError:
+            raise MoireError(
+                "the package pyarrow is missing, Parquet needs it: pip install pyarrow"
+            ) from None
+        out = io.BytesIO()
+        parquet.write_table(pyarrow.table(self.columns()), out)
+        return out.getvalue()
+
+    def picture(self) -> bytes:
+        """The signals over time, as PNG."""
+        columns = self.columns()
+        time_ms = columns.pop("time_s") * 1e3
+        figure, panels = report.drawing(
+            height=1.0 + 1.6 * len(columns), nrows=len(columns), sharex=True
+        )
+        for number, (panel, (name, values)) in enumerate(zip(panels, columns.items(), strict=True)):
+            panel.plot(time_ms, values, color=report.colour(number), linewidth=1.0)
+            panel.set_ylabel(name.replace("_", " "))
+        panels[-1].set_xlabel("time / ms")
+        return report.png(figure)
+
 
 def signed(words: ArrayLike, bits: int) -> Array:
     """Unsigned words as numbers in two's complement."""
@@ -101,17 +129,50 @@ def unwrapped(low_words: ArrayLike, near: int) -> Array:
     return numpy.asarray(path - path[-1] + last, float)
 
 
+@dataclass(frozen=True)
+class Setting:
+    """What a recording has."""
+
+    axis: int
+    signals: tuple[str, ...]  # of SIGNALS, in their order
+    samples: int
+    every: int  # ticks from sample to sample
+
+    @property
+    def words(self) -> int:
+        """Words of the recording."""
+        return self.samples * len(self.signals)
+
+
 class TickScope:
     """The recorder of ticks of the node of an axis."""
 
     def __init__(self, axis: Axis):
         self.axis, self.node = axis, axis.node
-        self.signals: tuple[str, ...] = ()
-        self.samples = self.every = 0
+
+    @property
+    def nothing(self) -> str:
+        """Why there is nothing to read."""
+        return f"node {self.node.address} has no recording: begin one with `moire scope record`"
+
+    def field(self, name: str) -> int:
+        """A field of the node's registers, by register and field with a dot."""
+        field = NODE_FIELDS[name]
+        return field.value(self.node.read_register(field.address()))
+
+    def setting(self) -> Setting:
+        """The setting of the last recording, whoever began it."""
+        chosen = self.field("scope.signals")
+        return Setting(
+            self.field("scope.axis"),
+            tuple(name for name, bit in SIGNALS.items() if chosen >> bit & 1),
+            self.field("scope_samples.length"),
+            max(1, self.field("scope_samples.every")),
+        )
 
     def words(self) -> int:
         """The size of the recorder's memory in words; 0: there is no recorder."""
-        return BUILD.value(self.node.read_register(BUILD.address())) * int(BUILD.lsb)
+        return self.field("build.scope") * int(NODE_FIELDS["build.scope"].lsb)
 
     def longest(self, signals: Sequence[str]) -> int:
         """The most samples of these signals that one recording can have; raises NotRecorded."""
@@ -151,7 +212,6 @@ class TickScope:
             raise OutOfRange(
                 f"{count} samples of {len(chosen)} signals do not fit: from 1 to {most}"
             )
-        self.signals, self.samples, self.every = chosen, count, ticks
         self.axis.request(
             "record_ticks",
             signals=sum(1 << SIGNALS[name] for name in chosen),
@@ -169,14 +229,24 @@ class TickScope:
         `progress` gets the number of words read so far. It sends requests often enough for the
         watchdog.
         """
-        transport = self.axis.transport
+        transport, setting = self.axis.transport, self.setting()
+        if setting.axis != self.axis.number:
+            raise NotRecorded(
+                f"the recording of node {self.node.address} is of axis {setting.axis}, not of axis "
+                f"{self.axis.number}"
+            )
+        if setting.words == 0:
+            raise NotRecorded(self.nothing)
         tick_s = 1 / self.node.identity.tick_hz
-        end = transport.now() + self.samples * self.every * tick_s * 2 + 2.0
-        total = self.samples * len(self.signals)
+        end = transport.now() + setting.samples * setting.every * tick_s * 2 + 2.0
+        total = setting.words
         words: list[int] = []
         while len(words) < total:
             reply = self.node.request("read_ticks")
-            if code_name(SCOPE_STATES, reply["state"], "state") == "full":
+            state = code_name(SCOPE_STATES, reply["state"], "state")
+            if state == "empty":
+                raise NotRecorded(self.nothing)
+            if state == "full":
                 if reply["first"] != len(words) % (1 << 16):
                     raise NotRecorded(
                         "another client has read the recording at the same time: record again"
@@ -190,9 +260,9 @@ class TickScope:
                     "servo run?"
                 )
             self.node.bus.until_next_poll(self.node)
-        rows = numpy.array(words[:total], numpy.int64).reshape(self.samples, -1).T
+        rows = numpy.array(words[:total], numpy.int64).reshape(setting.samples, -1).T
         values: dict[str, Array] = {}
-        for name, row in zip(self.signals, rows, strict=True):
+        for name, row in zip(setting.signals, rows, strict=True):
             if name == "sine_cosine":
                 values["sine"], values["cosine"] = signed(row & 0xFFFF, 16), signed(row >> 16, 16)
             elif name == "target":
@@ -202,7 +272,7 @@ class TickScope:
                 values[name] = signed(row, 16 if name == "command" else 32)
         if "target" in values and "error" in values:
             values["position"] = values["target"] - values["error"]
-        return TickRecord(self.every, tick_s, float(self.axis.period_nm), values)
+        return TickRecord(setting.every, tick_s, float(self.axis.period_nm), values)
 
     # the excitation
 

@@ -22,11 +22,12 @@ from moire.bus.protocol import IN_MOTION, MOST_AXES, NAMES, REQUESTS, parse_repl
 from moire.made.bus_tables import CAUSES, OPERATIONS, STATES
 from moire.made.registers import BLOCKS, FIELDS
 
-# what begins a motion, or drives the axis in another way; arm_scope does so with an amplitude
+# what begins a motion, or drives the axis in another way; arm_scope does so with an amplitude, and
+# excite with a period
 MOTIONS = frozenset(
     {
         *("home", "move", "prepare", "start", "start_at_sync", "begin_stream", "set_point"),
-        *("turn_to", "arm_scope", "step_fine"),
+        *("turn_to", "arm_scope", "step_fine", "excite"),
     }
 )
 POLLS = frozenset({"identify", "status", "position", "encoder", "signal"})  # may be merged
@@ -274,9 +275,13 @@ def places_of(address: int, operation: str, body: bytes) -> Iterator[Place]:
 
 
 def is_motion(operation: str, body: bytes) -> bool:
-    """Whether a request begins a motion: a scope without an amplitude only looks."""
+    """Whether a request begins a motion: a scope without an amplitude only looks, and without a
+    period an excitation ends.
+    """
     if operation == "arm_scope":
         return fields_of(operation, body)["amplitude"] != 0
+    if operation == "excite":
+        return fields_of(operation, body)["period"] != 0
     return operation in MOTIONS
 
 

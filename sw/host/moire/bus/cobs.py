@@ -101,11 +101,12 @@ def speed_in(content: bytes) -> float | None:
 class PacketReader:
     """Cuts a stream of bytes into the contents of packets.
 
-    `dropped` counts the pieces between two zeros that are no packet.
+    `dropped` counts the pieces between two zeros that are no packet. `longest` is the most stuffed
+    bytes of a packet.
     """
 
-    def __init__(self) -> None:
-        self.held, self.too_long = bytearray(), False
+    def __init__(self, longest: int = LONGEST_STUFFED) -> None:
+        self.held, self.too_long, self.longest = bytearray(), False, longest
         self.dropped = 0
 
     def feed(self, arrived: bytes) -> list[bytes]:
@@ -113,7 +114,7 @@ class PacketReader:
         contents = []
         for byte in arrived:
             if byte:
-                self.too_long = self.too_long or len(self.held) >= LONGEST_STUFFED
+                self.too_long = self.too_long or len(self.held) >= self.longest
                 if not self.too_long:
                     self.held.append(byte)
                 continue

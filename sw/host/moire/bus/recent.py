@@ -14,7 +14,7 @@ from moire.bus.arbiter import MOTIONS, POLLS, operation_of
 KEPT = POLLS | {"get_parameter"}
 READINGS = KEPT | {  # change nothing that a kept reply says
     *("counters", "follow", "get_correction", "get_harmonic", "get_segments", "read_register"),
-    *("read_scope", "scope", "segments"),
+    *("read_scope", "scope", "segments", "record_ticks", "read_ticks", "load_excitation"),
 }
 # after these a node is still the same, and so are its parameters
 OF_AN_AXIS = MOTIONS | {"stop", "enable", "reset_faults"}

@@ -169,8 +169,16 @@ def web_door(gateway: "Gateway", doors: Doors, description: Description) -> "Web
     def path(name: str | None) -> Path | None:
         return None if name is None else Path(name)
 
-    files = map(path, (doors.token, doors.read_token, doors.certificate, doors.key))
-    return WebDoor(gateway, Settings(doors.bind, doors.http, *files, description=description))
+    settings = Settings(
+        doors.bind,
+        doors.http,
+        path(doors.token),
+        path(doors.read_token),
+        path(doors.certificate),
+        path(doors.key),
+        description,
+    )
+    return WebDoor(gateway, settings)
 
 
 @contextmanager

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands that find what is wrong: fault, selftest."""
 
+from itertools import chain
+
 import click
 
 from moire import units
+from moire.analysis import loopback
 from moire.analysis import selftest as checks
 from moire.cli.commands.axis import table
 from moire.cli.parser import moire
@@ -13,6 +16,7 @@ from moire.client import remedies
 from moire.client.records import Signal
 
 NAMES = sorted({name for remedies_of, _ in remedies.TABLES.values() for name in remedies_of})
+WALKS = {"open": loopback.open_checks, "plug": loopback.plug_checks}  # of the pins, by --pins
 
 
 @moire.command(
@@ -78,13 +82,26 @@ def explain(call: Call, name: str) -> None:
 
 @moire.command(
     "selftest",
-    help="Check a node without moving anything.",
+    help="Check a node without moving anything, or its pins without a machine.",
     example="moire --port /dev/ttyUSB0 selftest",
 )
-def selftest(call: Call) -> None:
+@click.option(
+    "--pins",
+    type=Name("check of the pins", WALKS),
+    metavar="CHECK",
+    help="Check the pins of the axes instead, with the machine taken off: 'open' checks that "
+    "inputs without a wire read as pressed; 'plug' switches the drives on and steps, through the "
+    "loop-back plug that the wiring page describes.",
+)
+def selftest(call: Call, pins: str | None) -> None:
     """Every check is made, even if one has failed."""
     found, address = [], call.options.address
-    for check in checks.checks(call.node):
+    made = (
+        chain(checks.node_checks(call.node), WALKS[pins](call.node))
+        if pins
+        else checks.checks(call.node)
+    )
+    for check in made:
         found.append(check)
         if not call.options.json:
             result = "passed" if check.passed else "FAILED"

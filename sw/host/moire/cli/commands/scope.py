@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands about the recorder in a node: scope arm, read, show."""
+"""The commands about the recorders in a node: scope arm, read, show; scope record, save."""
 
 from dataclasses import asdict
 from fractions import Fraction
@@ -11,8 +11,8 @@ from moire.analysis.scope import SAMPLES, TRIGGERS, Scope
 from moire.cli.files import write_bytes
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
-from moire.cli.values import FILE, LENGTH, TIME, WHOLE, Name
-from moire.made.bus_tables import SCOPE_STATES
+from moire.cli.values import DURATION, FILE, LENGTH, POSITIVE, TIME, WHOLE, Name
+from moire.made.bus_tables import SCOPE_STATES, TICK_SIGNALS
 
 EXAMPLE = (
     "moire --port twin home -- scope arm --trigger motion -- move 100um -- scope read move.csv"
@@ -20,7 +20,9 @@ EXAMPLE = (
 
 group = Group(
     "scope",
-    help="Record position, error and drive command of an axis.",
+    help="Record signals of an axis. `arm` and `read` are for every node: 128 samples of position, "
+    "error and command around a trigger. `record` and `save` need SCOPE_WORDS of rtl/node.sv: they "
+    "record chosen signals at each servo tick, evenly, thousands of samples.",
     example=EXAMPLE,
 )
 moire.add_command(group)
@@ -114,3 +116,73 @@ def show(call: Call) -> None:
     state = Scope(call.axis).state()
     words = dict(SCOPE_STATES.values()).get(state, state)
     call.say_of_axis({"state": state}, f"node {call.options.address}: {words}")
+
+
+SIGNALS = ",".join(name for name, _ in TICK_SIGNALS.values())
+
+
+@group.command(
+    "record",
+    help="Record signals of an axis at each servo tick from now on, or at one in some; return at "
+    "once.",
+    example="moire --port twin home -- scope record -- move 100um -- scope save move.csv",
+)
+@click.option(
+    "--signals",
+    default="target,error,command",
+    metavar=SIGNALS,
+    help="What is recorded, with commas between. target and error together also give the position. "
+    "The default is target,error,command.",
+)
+@click.option(
+    "--samples",
+    type=POSITIVE,
+    metavar="N",
+    help="The number of samples. The default is as many as fit.",
+)
+@click.option(
+    "--every",
+    type=DURATION,
+    metavar="TIME",
+    help="The time from sample to sample. The default is the servo tick.",
+)
+def record(call: Call, signals: str, samples: int | None, every: Fraction | None) -> None:
+    """The recording goes on in the node."""
+    from moire.analysis.tick_scope import TickScope  # NumPy only where it is needed
+
+    scope = TickScope(call.axis)
+    scope.start([name.strip() for name in signals.split(",") if name.strip()], samples, every)
+    setting = scope.setting()
+    seconds = Fraction(setting.samples * setting.every, call.node.identity.tick_hz)
+    call.say_of_axis(
+        {"signals": setting.signals, "samples": setting.samples, "every_ticks": setting.every},
+        f"{call.where}: {setting.samples} samples of {', '.join(setting.signals)} in "
+        f"{units.format_time(seconds)}",
+    )
+
+
+@group.command(
+    "save",
+    help="Wait until that recording is complete, then write it.",
+    example="moire scope save move.csv --picture move.png",
+)
+@click.argument(
+    "file",
+    type=FILE,
+    metavar="FILE",
+    help="The names of the columns end in their units. A name that ends in .parquet gives Parquet, "
+    "any other one CSV.",
+)
+@click.option("--picture", type=FILE, metavar="PNG", help="Draw the signals over time.")
+def save(call: Call, file: str, picture: str | None) -> None:
+    """The samples are those of equally spaced ticks."""
+    from moire.analysis.tick_scope import TickScope
+
+    made = TickScope(call.axis).read()
+    write_bytes(file, made.parquet() if file.endswith(".parquet") else made.csv().encode())
+    if picture:
+        write_bytes(picture, made.picture())
+    call.say_of_axis(
+        {"file": file, **{name: list(values) for name, values in made.columns().items()}},
+        f"{len(made.time_s)} samples of {', '.join(made.values)} in {file}",
+    )

@@ -93,9 +93,9 @@ def contradiction(given: Mapping[str, Any]) -> str | None:
 @click.option(
     "--records",
     type=click.IntRange(1, 100),
-    default=3,
+    default=2,
     metavar="N",
-    help="Number of records of the frequency response, which are averaged. The default is 3.",
+    help="Number of records of the frequency response, which are averaged. The default is 2.",
 )
 @click.option(
     "--points",
@@ -197,12 +197,11 @@ def tune(
     if file is not None:
         plant = tuner.identify(tuner.Record(*read_record(file), tick_s))
     elif method == RESPONSE or (method is None and TickScope(call.axis).words()):
-        excitation = frequency_response.multisine(tick_s, peak=peak)
         nm_s = None if speed is None else speed * 1_000_000
-        response = frequency_response.measure(call.switch_on(), excitation, nm_s, records)
+        response = frequency_response.measure(call.switch_on(), peak, nm_s, records)
         if points:
             write_text(points, response.csv())
-        plant = frequency_response.fit(frequency_response.check(response))
+        plant = frequency_response.fit(response)
     else:
         record = scope.excite(call.switch_on(), amplitude, every, reach)
         plant = tuner.identify_samples(*scope.lsb(record), tick_s)

@@ -85,6 +85,11 @@ export class AxisView {
     }
   }
 
+  /** The name of the axis in the description of the machine, if it has one. */
+  call(name) {
+    this.element.querySelector("h2").textContent = name ? `${name} (axis ${this.name})` : `Axis ${this.name}`;
+  }
+
   mayChange(may) {
     this.fields.controls.hidden = !may;
   }

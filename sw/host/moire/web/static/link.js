@@ -27,10 +27,11 @@ export function pathOf(name) {
 }
 
 const MOST_AXES = 32; // of a stream
+const addressesOf = (nodes) => nodes.filter((node) => node.axes).map((node) => node.address);
 const axesOf = (nodes) => nodes.flatMap((node) => node.axes ?? []).slice(0, MOST_AXES);
 
 export class Link {
-  /** `on` has the functions connecting, open(server, axes), lost(reason), needsToken(refusal),
+  /** `on` has the functions connecting, open(server, axes, addresses), lost(reason), needsToken(refusal),
    *  samples(rows), beat(server). */
   constructor(on) {
     this.on = on;
@@ -59,7 +60,7 @@ export class Link {
     try {
       const server = await this.http("GET", "/api");
       const { nodes } = await this.http("GET", "/api/nodes");
-      this.open(server, axesOf(nodes));
+      this.open(server, axesOf(nodes), addressesOf(nodes));
     } catch (error) {
       if (error.status === 401) {
         sessionStorage.removeItem(KEPT);
@@ -77,17 +78,17 @@ export class Link {
     const axes = axesOf(nodes);
     if (!axes.length) return;
     this.socket.send(JSON.stringify({ stream: { axes: axes.join(","), every: EVERY } }));
-    this.on.open(await this.request("GET", "/api"), axes);
+    this.on.open(await this.request("GET", "/api"), axes, addressesOf(nodes));
   }
 
-  open(server, axes) {
+  open(server, axes, addresses) {
     const query = new URLSearchParams({ axes: axes.join(","), every: EVERY });
     if (this.token) query.set("token", this.token);
     const socket = new WebSocket(`${location.origin.replace("http", "ws")}/api/stream?${query}`);
     this.socket = socket;
     let beat = 0;
     socket.onopen = () => {
-      this.on.open(server, axes);
+      this.on.open(server, axes, addresses);
       beat = setInterval(() => this.beat(socket), BEAT_MS);
     };
     socket.onmessage = (event) => this.take(JSON.parse(event.data));

@@ -3,11 +3,14 @@
 
 import { AxisView } from "./axis.js";
 import { BusPanel } from "./bus.js";
+import { CalibrationPanel } from "./calibration.js";
 import { releaseAll } from "./hold.js";
+import { JobPanel } from "./job.js";
 import { Link } from "./link.js";
 import { ParameterTable } from "./parameters.js";
 import { History, Plot, QUANTITIES } from "./plot.js";
 import { ScopePanel } from "./scope.js";
+import { SetupPanel } from "./setup.js";
 import { SignalPanel } from "./signal.js";
 
 const DRAW_MS = 80; // between two pictures of the plots
@@ -20,7 +23,7 @@ let mayChange = false;
 let beats = 0;
 
 const link = new Link({
-  open(server, names) {
+  open(server, names, nodes) {
     mayChange = server.may_change;
     at("access").hidden = true;
     at("lost").hidden = true;
@@ -31,13 +34,17 @@ const link = new Link({
     document.querySelector(".keys").hidden = !mayChange;
     setLink("connected", mayChange ? "connected" : "connected, read only");
     if (names.join() !== [...views.keys()].join()) build(names);
-    for (const view of views.values()) {
+    for (const [name, view] of views) {
       view.mayChange(mayChange);
+      view.call(server.names[name]);
       view.readLimits().catch((error) => view.fail(error, null));
     }
     parameters.open([...views.keys()], mayChange);
     scope.open([...views.keys()], mayChange);
     signal.open([...views.keys()]);
+    calibration.open([...views.keys()], mayChange);
+    setup.open([...views.keys()], mayChange);
+    job.open(nodes, mayChange).catch(() => {});
     bus.read().catch(() => {});
     showServer(server);
   },
@@ -65,12 +72,14 @@ const link = new Link({
       const view = views.get(name);
       if (!view) continue;
       view.show(row);
+      setup.show(row);
       if (!row.error && !frozen) histories.get(name).add(row);
     }
   },
   beat(server) {
     showServer(server);
     bus.read().catch(() => {}); // a lost server is shown by what asks on
+    job.read().catch(() => {});
     if (++beats % 2 === 0) {
       for (const view of views.values()) view.readSpeed().catch(() => {});
     }
@@ -81,6 +90,9 @@ const parameters = new ParameterTable(at("parameters"), link);
 const scope = new ScopePanel(at("scope"), link);
 const signal = new SignalPanel(at("signal"), link);
 const bus = new BusPanel(at("bus"), link);
+const calibration = new CalibrationPanel(at("calibration"), link);
+const job = new JobPanel(at("job"), link);
+const setup = new SetupPanel(at("setup"), link);
 
 function setLink(state, text) {
   at("link").dataset.state = state;

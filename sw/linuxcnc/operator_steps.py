@@ -25,7 +25,7 @@ import linuxcnc
 
 PATIENCE_S = 120.0  # of each step, on the clock of the computer
 LOOK_S = 0.01
-STEADY_LOOKS = 20  # after which an emergency stop that was reset counts as released
+STEADY_LOOKS = 20  # in a row, at a state that lasts
 
 
 class Operator:
@@ -55,24 +55,27 @@ class Operator:
         return self.status.task_state == linuxcnc.STATE_ON
 
     def is_idle(self):
-        return self.status.interp_state == linuxcnc.INTERP_IDLE and self.status.inpos
+        status = self.status
+        return status.interp_state == linuxcnc.INTERP_IDLE and status.inpos and not status.queue
+
+    def stays(self, condition):
+        """Whether a condition is true for STEADY_LOOKS in a row."""
+        for _ in range(STEADY_LOOKS):
+            if not condition():
+                return False
+            time.sleep(LOOK_S)
+            self.look()
+        return True
 
     def on(self):
-        looks, released = 0, (linuxcnc.STATE_ESTOP_RESET, linuxcnc.STATE_ON)
-
-        def is_reset():
-            nonlocal looks
-            if looks == 0 or self.status.task_state not in released:
-                looks = 0
-                self.command.state(linuxcnc.STATE_ESTOP_RESET)
+        def tried():
+            for state in (linuxcnc.STATE_ESTOP_RESET, linuxcnc.STATE_ON):
+                self.command.state(state)
                 self.command.wait_complete()
-            looks += 1
-            return looks > STEADY_LOOKS
+                self.look()
+            return self.stays(self.is_on)
 
-        if not self.wait(is_reset):
-            return False
-        self.command.state(linuxcnc.STATE_ON)
-        return self.wait(self.is_on)
+        return self.wait(tried)
 
     def home(self):
         self.command.mode(linuxcnc.MODE_MANUAL)
@@ -84,10 +87,8 @@ class Operator:
             self.command.wait_complete()
         self.command.home(-1)
         joints = range(self.status.joints)
-        done = self.wait(
-            lambda: not self.is_on() or all(self.status.homed[n] for n in joints)
-        )
-        return done and self.is_on() and self.wait(self.is_idle)
+        done = self.wait(lambda: not self.is_on() or all(self.status.homed[n] for n in joints))
+        return done and self.finish()
 
     def start(self, program):
         self.command.mode(linuxcnc.MODE_AUTO)
@@ -95,13 +96,16 @@ class Operator:
         self.command.program_open(str(Path(program).resolve()))
         self.command.wait_complete()
         self.command.auto(linuxcnc.AUTO_RUN, 0)
-        return self.wait(lambda: not self.is_on() or not self.is_idle())
+        return self.wait(
+            lambda: not self.is_on() or self.status.interp_state != linuxcnc.INTERP_IDLE
+        )
 
     def line(self, number):
         return self.wait(lambda: self.status.motion_line >= number or not self.is_on())
 
     def finish(self):
-        return self.wait(lambda: self.is_idle() or not self.is_on()) and self.is_on()
+        ended = self.wait(lambda: not self.is_on() or self.stays(self.is_idle))
+        return ended and self.is_on()
 
     def override(self, factor):
         self.command.feedrate(factor)

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-2.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Makes a configuration of LinuxCNC from a machine file: see linuxcnc_config.generate."""
 
 import argparse

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-2.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """G-code programs whose path is known: the text for LinuxCNC, and the distance of a point from the
 programmed path. Lengths in mm, in X, Y, Z.
 """
@@ -170,7 +170,9 @@ def pocket(corner: tuple[float, float], size: float, step: float, z: float, feed
     found = Program((x, y, z + 1), feed).to(x, y, z)
     for n in range(round(size / step) + 1):
         ends = (x, x + size) if n % 2 else (x + size, x)
-        found.to(ends[1] if n == 0 else found.place[0], y + n * step, z).to(ends[0], y + n * step, z)
+        found.to(ends[1] if n == 0 else found.place[0], y + n * step, z).to(
+            ends[0], y + n * step, z
+        )
     for end in ((x + size, y + size), (x + size, y), (x, y), (x, y + size)):
         found.to(*end, z)
     return found

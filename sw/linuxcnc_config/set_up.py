@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sets the real-time link of a node up for the driver, over the bus: which registers each packet
+carries, the session, the watchdog. The made HAL file runs it before it loads the driver.
+
+    python -m linuxcnc_config.set_up --port /dev/ttyUSB0 --address 1 --axes 3 --session 4711
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from linuxcnc_config.lists import READS, WRITES
+from moire.bus.transport import open_bus
+from moire.client.bus import Bus
+from moire.client.link import ProcessData
+from moire.client.node import Node
+from moire.errors import MoireError
+
+WATCHDOG_S = 0.05
+LONGEST_SESSION = (1 << 24) - 1
+
+
+class Unfit(Exception):
+    """One sentence that says why the node cannot be used."""
+
+
+def set_up(
+    node: Node,
+    axes: int,
+    session: int,
+    bit_time: int | None = None,
+    watchdog_s: float = WATCHDOG_S,
+    force: bool = False,
+) -> None:
+    """Sets the link of a node up and switches it on; Unfit if it has none, has another number of
+    axes, or serves another host, unless it is to be taken from that by `force`.
+    """
+    state = node.read_named("link.state")
+    if not state["built"]:
+        raise Unfit("the node has no real-time link")
+    found = node.read_named("node.build")["axes"]
+    if found != axes:
+        raise Unfit(f"the node has {found} axes, the configuration has {axes}")
+    if state["on"] and not state["expired"] and not force:
+        raise Unfit(f"another host runs the node, in session {state['session']}")
+    ProcessData(WRITES, READS).set_up(node, bit_time, watchdog_s, session=session)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m linuxcnc_config.set_up",
+        description="Sets the real-time link of a node up for LinuxCNC.",
+    )
+    parser.add_argument("--port", required=True, help="the port of the bus")
+    parser.add_argument("--address", type=int, default=1, help="of the node on the bus")
+    parser.add_argument("--axes", type=int, required=True, help="axes of the configuration")
+    parser.add_argument("--session", type=int, required=True, help=f"1 to {LONGEST_SESSION}")
+    parser.add_argument("--force", action="store_true", help="take the node from another host")
+    options = parser.parse_args(arguments)
+    try:
+        with open_bus(options.port) as port:
+            node = Bus(port).node(options.address)
+            set_up(node, options.axes, options.session, force=options.force)
+    except (MoireError, Unfit) as why:
+        print(f"moire: {options.port}: {why}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tick_scope.c: signals at each servo tick, read in order; a waveform that ends with any request to
+its axis, and what is refused.
+"""
+
+import pytest
+
+from twin.compiled.node import FAULT, PERIOD, TABLE, Axis, CompiledNode
+
+SIGNAL = {name: 1 << bit for name, (bit, _) in TABLE["tick_signal"].items()}
+STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}
+WORDS, AT_ONCE, VALUES = 1024, 14, 24
+LIMIT = 12345
+
+
+@pytest.fixture
+def machine():
+    made = CompiledNode(Axis(), Axis(), address=1, scope_words=WORDS)
+    for axis in (0, 1):
+        made.set(axis, home_method=37, settle_time=1, output_limit=LIMIT)
+        made.ask("enable", axis=axis, on=1)
+        made.ask("home", axis=axis)
+    made.run(200, until=lambda: made.status(1)["ended"] == "ok" and made.status(0)["ended"] == "ok")
+    return made
+
+
+def record(machine, signals=SIGNAL["error"], every=1, samples=100, axis=0):
+    return machine.request(
+        "record_ticks", axis=axis, signals=signals, every=every, samples=samples
+    )[0]
+
+
+def state(machine):
+    return STATE[machine.ask("read_ticks")["state"]]
+
+
+def words(machine, count):
+    out = []
+    while len(out) < count:
+        reply = machine.ask("read_ticks")
+        assert STATE[reply["state"]] == "full" and reply["first"] == len(out)
+        out += [reply[f"word_{n}"] for n in range(AT_ONCE)]
+    assert not any(out[count:]), "nothing follows the last word"
+    return out[:count]
+
+
+def excite(machine, period=100, axis=0):
+    return machine.request("excite", axis=axis, period=period)[0]
+
+
+def period(machine):
+    return machine.scope.field("EXCITATION_PERIOD")
+
+
+def test_a_record_has_each_signal_of_each_sample_in_order(machine):
+    assert state(machine) == "empty"
+    machine.ask("move", axis=1, target=3 * PERIOD)
+    assert record(machine, SIGNAL["target"] | SIGNAL["error"], 2, 50, axis=1) == "ok"
+    assert state(machine) == "recording" and machine.scope.field("SCOPE_AXIS") == 1
+    machine.run(30)
+    assert state(machine) == "full"
+    # reading the state has passed the first words
+    assert machine.ask("read_ticks")["first"] == AT_ONCE
+    assert record(machine, SIGNAL["target"] | SIGNAL["error"], 2, 50, axis=1) == "ok"
+    machine.run(30)
+    assert words(machine, 100) == machine.scope.recorded
+    assert machine.ask("read_ticks")["first"] == 100
+
+
+def test_as_many_samples_as_fit_are_recorded_and_no_more(machine):
+    assert record(machine, 63, samples=WORDS // 6) == "ok"
+    assert record(machine, 63, samples=WORDS // 6 + 1) == "out_of_range"
+    assert record(machine, samples=WORDS) == "ok"
+    assert record(machine, samples=WORDS + 1) == "out_of_range"
+    assert record(machine, samples=0) == "out_of_range"
+    assert record(machine, signals=0) == "out_of_range"
+    assert record(machine, signals=64) == "out_of_range"
+    assert record(machine, axis=2) == "no_such_axis"
+
+
+def test_a_waveform_is_loaded_up_to_its_longest(machine):
+    longest = TABLE["constant"]["waveform_longest"][0]
+    values = {f"value_{n}": 100 * n - 900 for n in range(VALUES)}
+    machine.ask("load_excitation", first=48, **values)
+    assert [machine.scope.waveform[48 + n] for n in range(VALUES)] == list(values.values())
+    machine.ask("load_excitation", first=longest - 2, **values)
+    assert machine.scope.waveform[longest - 1] == -800 and 0 not in machine.scope.waveform
+
+
+def test_an_excitation_has_the_limit_of_its_axis_and_ends_on_request(machine):
+    assert excite(machine, 4096, axis=1) == "ok" and period(machine) == 4096
+    assert machine.scope.field("EXCITATION_AXIS") == 1
+    assert machine.scope.field("EXCITATION_LIMIT") == LIMIT
+    machine.run(50)
+    assert period(machine) == 4096
+    assert excite(machine, 0, axis=1) == "ok" and period(machine) == 0
+
+
+@pytest.mark.parametrize(
+    "name, fields",
+    [
+        ("stop", dict(axis=0)),
+        ("move", dict(axis=0, target=PERIOD)),
+        ("home", dict(axis=0)),
+        ("enable", dict(axis=0, on=0)),
+    ],
+)
+def test_any_request_to_the_axis_ends_its_excitation(machine, name, fields):
+    assert excite(machine) == "ok"
+    machine.ask(name, **fields)
+    machine.run(2)
+    assert period(machine) == 0
+
+
+def test_a_fault_ends_the_excitation(machine):
+    assert excite(machine) == "ok"
+    machine.axes[0].causes |= FAULT["drive"]
+    machine.run(2)
+    assert period(machine) == 0
+
+
+def test_an_excitation_that_cannot_be_is_refused(machine):
+    assert excite(machine, 4097) == "out_of_range"
+    assert excite(machine, axis=0) == "ok"
+    assert excite(machine, axis=1) == "busy"
+    assert excite(machine, 0, axis=0) == "ok"
+    machine.ask("home", axis=1)
+    assert excite(machine, axis=1) == "busy", "it homes"
+    machine.ask("enable", axis=0, on=0)
+    assert excite(machine, axis=0) == "not_enabled"
+
+
+def test_without_a_recorder_all_is_refused():
+    machine = CompiledNode(Axis())
+    assert machine.request("excite", axis=0, period=5)[0] == "not_built"
+    assert record(machine) == "not_built"
+    values = {f"value_{n}": 0 for n in range(VALUES)}
+    assert machine.request("load_excitation", first=0, **values)[0] == "not_built"
+    assert state(machine) == "empty"
+
+
+def test_the_node_waits_between_requests_unless_it_excites(machine):
+    idle = machine.firmware.firmware_idle_ticks
+    before = idle()
+    assert excite(machine) == "ok"
+    assert idle() == 0
+    assert excite(machine, 0) == "ok"
+    machine.run(2)
+    assert idle() == before

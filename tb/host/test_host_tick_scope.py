@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""moire.analysis.tick_scope: requests to the node, its words as signals in their units, and what is
+is refused; test_firmware_tick_scope has the side of the node.
+"""
+
+import io
+
+import pytest
+from PIL import Image
+from pyarrow import parquet
+
+from moire.analysis import tick_scope
+from moire.analysis.tick_scope import NotRecorded, TickScope
+from moire.client.bus import Bus
+from moire.errors import OutOfRange, Refused
+from tb.fakes.bus_node import START, BusNode
+from tb.fakes.rs485_bus import Rs485Bus
+from tb.host.test_host_command_line import Call, sentence
+from twin.compiled.node import DEFINES, PERIOD, Axis
+
+WORDS = 1024
+
+
+class Ramp(Axis):
+    """An axis that moves by itself, by the same distance in each tick."""
+
+    def __init__(self, position=START, step=PERIOD // 16):
+        super().__init__(position)
+        self.step, self.ticks = step, 0
+
+    def tick(self):
+        self.machine += self.step
+        self.speed = self.step
+        self.ticks += 1
+        self.word[DEFINES["AXIS_COMMAND"]] = -16384 + self.ticks & 0xFFFF
+
+    @property
+    def error(self):
+        return -3 * self.ticks
+
+
+def node_of(axis=None):
+    return BusNode(axes=[axis or Ramp()], scope_words=WORDS)
+
+
+def scope_of(node):
+    return TickScope(Bus(Rs485Bus(node)).axis())
+
+
+def test_signals_are_read_in_their_units_at_equal_distances():
+    node = node_of()
+    scope = scope_of(node)
+    scope.start(("command", "error", "velocity"), 100, "500us")
+    assert node.written("record_ticks") == [dict(axis=0, signals=0b111000, every=2, samples=100)]
+    record = scope.read()
+    columns = record.columns()
+    assert list(columns) == ["time_s", "velocity_nm_per_s", "error_nm", "command_of_full_scale"]
+    assert columns["time_s"][:3] == pytest.approx([0, 0.0005, 0.001])
+    assert len(record.time_s) == 100
+    errors = columns["error_nm"] * PERIOD / 800
+    assert errors[1:] - errors[:-1] == pytest.approx([-6] * 99)
+    commands = columns["command_of_full_scale"] * 32768
+    assert commands[1:] - commands[:-1] == pytest.approx([2] * 99)
+    assert columns["velocity_nm_per_s"] == pytest.approx([800 / 16 * 4000] * 100)
+
+
+def test_target_and_error_give_the_position_through_every_wrap_of_a_word():
+    axis = Ramp()
+    node = node_of(axis)
+    scope = scope_of(node)
+    scope.start(("target", "error"))
+    record = scope.read()
+    assert len(record.time_s) == WORDS // 2
+    assert list(record.values["target"]) == [axis.target] * (WORDS // 2)
+    assert list(record.values["position"]) == list(record.values["target"] - record.values["error"])
+    low = [2**31 - 10, -(2**31) + 10, -(2**31) + 30]
+    assert list(tick_scope.unwrapped([word % 2**32 for word in low], 5 * 2**32 - 2**31 + 31)) == [
+        5 * 2**32 - 2**31 + step for step in (-10, 10, 30)
+    ]
+
+
+def test_sine_and_cosine_are_one_signal():
+    node = node_of()
+    node.axes[0].word[DEFINES["AXIS_SAMPLE"]] = 0xFFFE_0005
+    scope = scope_of(node)
+    scope.start(["sine_cosine"], 3)
+    columns = scope.read().columns()
+    assert list(columns["sine_counts"]) == [5] * 3 and list(columns["cosine_counts"]) == [-2] * 3
+
+
+@pytest.mark.parametrize(
+    "wrong, message",
+    [
+        (dict(signals=["noise"]), "no signal 'noise' to record: there are sine_cosine, target"),
+        (dict(signals=[]), "name a signal"),
+        (dict(signals=["error"], samples=WORDS + 1), "from 1 to 1024"),
+        (dict(signals=["error"], samples=0), "from 1 to 1024"),
+        (dict(signals=["error"], every="100us"), "250us to 16.38"),
+        (dict(signals=["error"], every="17s"), "250us to 16.38"),
+    ],
+)
+def test_wrong_settings_are_not_sent(wrong, message):
+    node = node_of()
+    with pytest.raises(OutOfRange, match=message):
+        scope_of(node).start(**wrong)
+    assert "record_ticks" not in node.executed
+
+
+def test_what_was_not_recorded_is_refused():
+    bare = scope_of(BusNode())
+    with pytest.raises(NotRecorded, match="build it with SCOPE_WORDS"):
+        bare.start(["error"])
+    with pytest.raises(NotRecorded, match="has no recording"):
+        scope_of(node_of()).read()
+    node = node_of()
+    scope = scope_of(node)
+    scope.start(["error"], 50)
+    node.scope.recording = False
+    node.scope.tick = lambda axes: None
+    node.scope.recording = True
+    with pytest.raises(NotRecorded, match="did not come to its end"):
+        scope.read()
+    node = node_of()
+    scope = scope_of(node)
+    scope.start(["error"], 50)
+    node.run(50)
+    node.ask("read_ticks")
+    with pytest.raises(NotRecorded, match="another client"):
+        scope.read()
+
+
+def test_a_recording_of_another_axis_is_not_mistaken_for_its_own():
+    node = BusNode(axes=[Ramp(), Ramp()], scope_words=WORDS)
+    bus = Bus(Rs485Bus(node))
+    TickScope(bus.node(1).axis(1)).start(["error"], 5)
+    with pytest.raises(NotRecorded, match="is of axis 1, not of axis 0"):
+        TickScope(bus.node(1).axis(0)).read()
+
+
+def test_a_waveform_is_loaded_and_lasts_as_long_as_the_block():
+    node = node_of()
+    scope = scope_of(node)
+    values = [(-1) ** n * n for n in range(100)]
+    assert scope.load(values) == 100
+    assert [node.scope.waveform[n] for n in range(100)] == values
+    scope.axis.enable()
+    with pytest.raises(ValueError, match="within"), scope.excited(100):
+        assert node.scope.field("EXCITATION_PERIOD") == 100
+        raise ValueError("within")
+    assert node.scope.field("EXCITATION_PERIOD") == 0
+    for wrong in ([], [0] * 4097, [32768]):
+        with pytest.raises(OutOfRange, match="1 to 4096 values"):
+            scope.load(wrong)
+    scope.axis.disable()
+    with pytest.raises(Refused, match="the drive is off"), scope.excited(100):
+        pass
+
+
+def test_scope_record_and_save_write_files_with_units(tmp_path):
+    table, drawn = tmp_path / "a.csv", tmp_path / "a.png"
+    call = Call(
+        ["scope", "record", "--signals", "error,command", "--samples", "40", "--"]
+        + ["scope", "save", str(table), "--picture", str(drawn)],
+        node_of(),
+    )
+    assert call.code == 0, call.err
+    assert "40 samples of error, command in 10ms" in call.out
+    rows = table.read_text().splitlines()
+    assert rows[0] == "time_s,error_nm,command_of_full_scale" and len(rows) == 41
+    assert Image.open(drawn).format == "PNG"
+    table = tmp_path / "a.parquet"
+    node = node_of()
+    call = Call(["scope", "record", "--samples", "9", "--", "scope", "save", str(table)], node)
+    assert call.code == 0, call.err
+    read = parquet.read_table(io.BytesIO(table.read_bytes()))
+    assert read.column_names == [
+        "time_s",
+        "target_nm",
+        "error_nm",
+        "command_of_full_scale",
+        "position_nm",
+    ]
+    assert "no signal 'sped'" in sentence(Call("scope record --signals sped", node_of()), 2)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The generator of configurations for LinuxCNC, and the set-up of a link."""
+
+import re
+
+import pytest
+
+from linuxcnc_config.__main__ import main
+from linuxcnc_config.generate import Misfit, load, texts
+from linuxcnc_config.lists import READS, WRITES
+from linuxcnc_config.set_up import Unfit, set_up
+from linuxcnc_config.set_up import main as set_up_program
+from moire.client.link import places
+from moire.made import link_tables as layout
+from tb.linuxcnc.ideal_node import IdealNode, address
+
+MILL = """
+title = "mill"
+[node]
+image = "steps"
+memory_kib = 64
+address = 3
+[linuxcnc]
+bus = "/dev/ttyUSB0"
+node = "serial:/dev/ttyUSB1:3000000"
+[[axis]]
+name = "X"
+drives = ["stepper"]
+[axis.linuxcnc]
+period_um = 4
+travel = [-1, 149]
+velocity = 50
+acceleration = 500
+"""
+
+
+def written(tmp_path, change=("", "")):
+    path = tmp_path / "mill.toml"
+    path.write_text(MILL.replace(*change))
+    return str(path)
+
+
+def test_the_configuration_has_the_numbers_of_the_machine_file(tmp_path):
+    made = texts(load(written(tmp_path)))
+    for line in ("MAX_VELOCITY = 50", "MAX_ACCELERATION = 500", "MIN_LIMIT = -1", "JOINTS = 1"):
+        assert f"\n{line}\n" in made["mill.ini"]
+    assert "\nsetp moire.0.axis.0.scale 250\n" in made["mill.hal"]  # periods per mm
+    assert re.search(
+        r"set_up --port /dev/ttyUSB0 --address 3 --axes 1 --session \d+", made["mill.hal"]
+    )
+    assert 'node="serial:/dev/ttyUSB1:3000000" axes=1 session=' in made["mill.hal"]
+
+
+def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(tmp_path):
+    found = load(written(tmp_path))
+    sessions = [re.findall(r"session[ =](\d+)", texts(found)["mill.hal"]) for _ in range(3)]
+    assert all(of_set_up == of_driver for of_set_up, of_driver in sessions)
+    assert len({one for one, _ in sessions}) == 3
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (("velocity = 50", "velocity = 0"), "velocity 0 must be above 0"),
+        (("travel = [-1, 149]", "travel = [5, 5]"), "travel from 5 to 5 has no length"),
+        (("travel = [-1, 149]", "travel = [5]"), "travel must be two numbers"),
+        (("travel = [-1, 149]", "travel = [1, 149]"), "rest 0 is outside the travel, 1 to 149"),
+        (("period_um = 4\n", ""), "period_um is missing"),
+        (("velocity = 50", "velocity = 50\nspeed = 2"), "there is no key speed"),
+        (('name = "X"', 'name = "left"'), "name 'left': LinuxCNC knows the axes X, Y, Z"),
+        (("serial:/dev/ttyUSB1:3000000", "ttyUSB1"), "write udp:HOST:PORT or serial:DEVICE:BAUD"),
+        (('node = "serial', 'delay_ms = 2\nnode = "serial'), "delay_ms 2: a set-point needs 4"),
+        (("[axis.linuxcnc]", "[axis.other]"), "there is no key other"),
+        (('drives = ["stepper"]', ""), "no axis has a drive: LinuxCNC has nothing to move"),
+    ],
+)
+def test_a_machine_file_that_does_not_fit_is_refused_in_a_line(tmp_path, change, words):
+    with pytest.raises(Misfit) as why:
+        load(written(tmp_path, change))
+    assert words in str(why.value) and "\n" not in str(why.value)
+
+
+def test_the_command_writes_a_folder_and_keeps_own_lines(tmp_path, capsys):
+    folder = tmp_path / "made"
+    for _ in range(2):
+        assert main([written(tmp_path), "--out", str(folder)]) == 0
+        assert (folder / "custom.hal").read_text() != ""
+        (folder / "custom.hal").write_text("# mine\n")
+    assert (folder / "custom.hal").read_text() == "# mine\n"
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "custom.hal",
+        "mill.hal",
+        "mill.ini",
+        "tool.tbl",
+    ]
+    assert main([str(tmp_path / "none.toml"), "--out", str(folder)]) == 1
+    assert "no such file" in capsys.readouterr().err
+
+
+def test_eight_axes_fit_into_a_packet():
+    writes, reads = places(WRITES, 8), places(READS, 8)
+    assert len(writes) <= layout.MOST_VALUES and len(reads) <= layout.MOST_VALUES
+    assert writes[-1].address == address("node", "set_point_commit")
+
+
+def test_the_set_up_refuses_another_number_of_axes_and_another_host():
+    node = IdealNode(2)
+    with pytest.raises(Unfit, match="the node has 2 axes, the configuration has 3"):
+        set_up(node, 3, 5)
+    set_up(node, 2, 5)
+    with pytest.raises(Unfit, match="another host runs the node, in session 5"):
+        set_up(node, 2, 6)
+    set_up(node, 2, 6, force=True)
+    node.advance(2_400_000)  # the watchdog has expired
+    set_up(node, 2, 7)
+    assert node.session == 7
+
+
+def test_the_set_up_refuses_a_node_without_a_link():
+    node = IdealNode(1)
+    node.read_named = lambda name: {"built": 0}
+    with pytest.raises(Unfit, match="the node has no real-time link"):
+        set_up(node, 1, 5)
+
+
+def test_the_set_up_program_says_in_a_line_why_it_fails(capsys):
+    line = ["--port", "/dev/no_such_port", "--axes", "3", "--session", "5"]
+    assert set_up_program(line) == 1
+    assert re.fullmatch(r"moire: /dev/no_such_port: .*\n", capsys.readouterr().err)

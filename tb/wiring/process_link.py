@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The real-time link in a bench."""
+
+from mutation.library import Bench, library
+from tb.link import test_process_link
+
+TOP = "process_link"
+PARAMETERS = {"CLK_HZ": test_process_link.CLK_HZ}
+
+
+class ProcessLink(Bench):
+    """The link, before its reset."""
+
+    def __init__(self, path=None, mutant=(0, 0, 0)):
+        super().__init__(path or library(TOP, PARAMETERS), mutant)
