@@ -93,6 +93,7 @@ module set_point_player #(
     logic [2:0] fetched;
     logic [7:0] ticks;
     logic starts;  // the first piece of a stream must be started
+    logic [AXES-1:0] powered;  // the drive was on one cycle ago
     logic outside;
     logic signed [47:0] position;
     logic signed [31:0] velocity;
@@ -122,7 +123,7 @@ module set_point_player #(
     wire                is_started = |(started & here);
     wire                is_ending = |(ending & here);
     wire                is_allowed = |(allowed & here);
-    wire                is_enabled = |(enabled & here);
+    wire                is_enabled = |(powered & here);
     wire                begins_here = |(begins & here);
     wire                stops_here = |(stop_due & here);
     wire signed [ 31:0] distance = commit_tick - tick_count - 32'(ahead_here);
@@ -148,16 +149,16 @@ module set_point_player #(
     assign piece_valid = phase == OFFER && is_active;
     assign piece_axis  = axis;
     assign piece_part  = part;
+    // what the piece begins with; a piece of one tick has another velocity than the one before it
+    wire reaches = piece == REACH;
+    wire signed [47:0] first_velocity = reaches && ticks == 8'd1 ? reached_velocity
+        : reaches || piece == EXTEND ? end_velocity : '0;
+    wire signed [47:0] first_acceleration = reaches ? acceleration : '0;
+    wire signed [31:0] first_jerk = reaches ? jerk : '0;
+    wire [24:0] duration = {piece == RELEASE, 16'd0, ticks};  // bit 24: the last piece
+    assign piece_word = part == 2'd0 ? 64'(first_velocity) : part == 2'd1 ? 64'(first_acceleration)
+        : part == 2'd2 ? 64'(first_jerk) : {39'd0, duration};
     always_comb begin
-        piece_word = '0;
-        case (part)
-            2'd0:
-            if (piece == REACH && ticks == 8'd1) piece_word = 64'(reached_velocity);
-            else if (piece == REACH || piece == EXTEND) piece_word = 64'(end_velocity);
-            2'd1: if (piece == REACH) piece_word = 64'(acceleration);
-            2'd2: if (piece == REACH) piece_word = 64'(jerk);
-            default: piece_word = {39'd0, piece == RELEASE, 16'd0, ticks};  // bit 24: the last one
-        endcase
         case (piece)
             REACH: new_end = {16'd0, reached_velocity, reached};
             EXTEND:
@@ -208,6 +209,7 @@ module set_point_player #(
     always_ff @(posedge clk) begin
         if (tick) tick_count <= tick_count + 1'b1;
         {start, stop} <= '0;
+        powered <= enabled;
         if (commit_goes_on) next_axis <= commit_done ? 3'd0 : next_axis + 1'b1;
         case (phase)
             REST:
@@ -268,7 +270,7 @@ module set_point_player #(
             default: phase <= REST;
         endcase
         if (rst) begin
-            {start, stop, tick_count, axis, scan, next_axis} <= '0;
+            {start, stop, powered, tick_count, axis, scan, next_axis} <= '0;
             phase <= REST;
         end
     end
@@ -354,7 +356,7 @@ module set_point_player #(
                 .rst,
                 .tick,
                 .allowed    (allowed[n]),
-                .enabled    (enabled[n]),
+                .enabled    (powered[n]),
                 .stops      (stops[n]),
                 // motion engine
                 .state_valid(result_valid && result_kind == STATE && result_axis == 3'(n)),

@@ -164,13 +164,17 @@ def logic_first(design: Design) -> tuple[list[Statement], list[Statement]]:
             else:
                 needs |= effect.needs
                 changes |= effect.changes
-        # executed once more before the first edge, it must compute the same again
+        # executed once more before the first edge, it must compute the same again; a variable of
+        # the function that a statement behind it computes has no value yet
         computed: set[str] = set()
         later = effect_of(design.program[n] for n in moved).changes
+        behind = (s for n, s in enumerate(design.program) if n not in moved)
+        unknown = effect_of(behind).changes & set(design.locals)
         count = len(stays)
         for n in moved:
             effect = design.program[n].effect
-            if (effect.needs - computed - set(design.locals)) & later:
+            needs = effect.needs - computed
+            if (needs - set(design.locals)) & later or needs & unknown:
                 stays.add(n)
             computed |= effect.sets
         if len(stays) == count:

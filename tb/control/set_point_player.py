@@ -42,7 +42,7 @@ class SetPointPlayer:
     def reset(self):
         self.axes = [SetPointAxis() for _ in range(self.count)]
         self.phase, self.axis, self.scan, self.next_axis = "rest", 0, 0, 0
-        self.tick_count = self.start = self.stop = 0
+        self.tick_count = self.start = self.stop = self.powered = 0
         self.kind, self.words, self.reached = None, [], None  # the piece, and where it ends
         self.starts = self.fetched = self.ticks = 0
         self.computed = None
@@ -119,6 +119,7 @@ class SetPointPlayer:
         SetPointQueue.
         """
         n, a, queue = self.axis, self.axes[self.axis], self.queue
+        self.powered, enabled = enabled, self.powered
         allowed, here_on = queue.allowed >> n & 1, enabled >> n & 1
         strobes, reason, cause, goes_on, begin_piece = [], 0, None, False, False
         ticks = self.ticks

@@ -130,7 +130,8 @@ async def latency_is_1(dut):
     is one cycle behind the rdata of the block.
     """
     bus = await Bus(dut).begin()
-    r, f = next((r, f) for r, f in bus.of("setting") if not r.wide and "r" in f.access)
+    own = [(r, f) for r, f in bus.of("setting") if r in bus.block.own and not r.wide]
+    r, f = next((r, f) for r, f in own if "r" in f.access)
     assert (await bus.write(r.word, 1 << f.low))[f.port] == 1
     assert await bus.read(r.word) >> f.low & 1 == 1
     assert (await bus.clk())["rdata"] == 0

@@ -30,6 +30,7 @@ STEPPER = {
     "steps_per_period": 4,
     "ki": 0,
     "encoder_fault_mask": 0,  # it has no sine and cosine
+    "settle_window": "2um",  # more than a step
 }
 S0_ADDRESS, STEPPER_ADDRESS = 1, 2
 
@@ -81,9 +82,10 @@ class Host:
         return self.axis.status().state
 
     def commit(self, tick, position, velocity):
-        """velocity in 2^-24 period per tick."""
+        """velocity in 2^-24 period per tick. Without a tick, it is FIRST ticks from now."""
         self.write("axis.set_point_position", position)
         self.write("axis.set_point_velocity", velocity)
+        tick = self.read("node.tick_count") + FIRST if tick is None else tick
         self.write("node.set_point_tick", tick)
         self.write("node.set_point_commit", 1)
         self.points.append((tick, position, velocity))
@@ -93,6 +95,10 @@ class Host:
         angle = 2 * math.pi * n / count
         speed = size * 2 * math.pi / count / INTERVAL * math.sin(angle)
         return self.points[0][1] + round(size * (1 - math.cos(angle))), round(speed * 256)
+
+    def commit_wave(self, n, size):
+        tick = self.points[1][0] + INTERVAL * n if n else None
+        self.commit(tick, *self.wave(n, size))
 
     def targets(self):
         """{tick: target} from the first set-point on, by the model."""
@@ -157,15 +163,17 @@ def test_a_stream_needs_a_drive_that_is_on_and_an_axis_that_is_homed(host):
 def test_an_axis_follows_a_streamed_wave_tick_by_tick_and_is_released_at_rest(hosts, address, size):
     host = hosts[address]
     host.begin()
-    first, seen = host.read("node.tick_count") + FIRST, []
+    seen = []
     for n in range(POINTS + 1):
-        host.commit(first + INTERVAL * n, *host.wave(n, size))
+        host.commit_wave(n, size)
+        first = host.points[1][0]
         if n > 2:
             while signed(host.read("node.tick_count") - first) < INTERVAL * (n - 2):
                 seen.append(host.seen())
     while signed(host.read("node.tick_count") - first) < INTERVAL * POINTS - 40:
         seen.append(host.seen())
     assert host.read("axis.stream_counts") == dict(accepted=POINTS + 1, late=0, refused=0)
+    assert host.read("axis.stream_state")["extrapolated"] == 0
     path = host.targets()
     for before, target, after in seen:
         assert target in {path.get(tick) for tick in range(before, after + 1)}, (before, target)
@@ -182,9 +190,8 @@ def test_an_axis_follows_a_streamed_wave_tick_by_tick_and_is_released_at_rest(ho
 
 def test_a_late_stream_stops_under_control_and_says_so(host):
     host.begin(late_limit=40)
-    first = host.read("node.tick_count") + FIRST
     for n in range(3):
-        host.commit(first + INTERVAL * n, *host.wave(n, 20_000))
+        host.commit_wave(n, 20_000)
     host.until(lambda: host.status() == "holding")
     stream, status = host.read("axis.stream_state"), host.axis.status()
     assert status.ended == "set_point_late" and not status.faults
@@ -200,9 +207,8 @@ def test_a_late_stream_stops_under_control_and_says_so(host):
 
 def test_other_motions_are_refused_and_a_stop_ends_the_stream(host):
     host.begin()
-    first = host.read("node.tick_count") + FIRST
     for n in range(3):
-        host.commit(first + INTERVAL * n, *host.wave(n, 20_000))
+        host.commit_wave(n, 20_000)
     host.until(lambda: host.read("axis.stream_state")["mode"] == 2)
     for refused in (
         lambda: host.axis.move(nm=100),
@@ -222,9 +228,8 @@ def test_other_motions_are_refused_and_a_stop_ends_the_stream(host):
 
 def test_a_fault_ends_the_stream_and_a_host_resets_it_by_registers(host):
     host.begin()
-    first = host.read("node.tick_count") + FIRST
     for n in range(2):
-        host.commit(first + INTERVAL * n, *host.wave(n, 20_000))
+        host.commit_wave(n, 20_000)
     with host.twin.fault("estop"):
         host.twin.run(0.02)
         assert host.status() == "faulted" and host.read("axis.stream_state")["ended"] == 4

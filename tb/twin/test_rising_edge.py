@@ -37,6 +37,12 @@ def test_logic_of_an_output_stays_behind_its_flip_flop():
     ]
 
 
+def test_logic_of_a_variable_that_is_computed_behind_stays_behind():
+    lines = parsed("a = b;", "b = x;", "v = a;", "f = v;", "x = v;")
+    program = rising_edge.Design({}, {"f"}, set(), {"v": BIT}, frozenset("fvx"), frozenset(), lines)
+    assert text_of(rising_edge.logic_first(program)[1])[-3:] == ["v = a;", "f = v;", "x = v;"]
+
+
 def test_logic_of_inputs_that_stays_behind_is_refused():
     with pytest.raises(statements.FormError, match="logic of inputs stays behind: i"):
         rising_edge.function(design("i", "a = i;", "f = a;"))
