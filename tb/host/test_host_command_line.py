@@ -344,7 +344,7 @@ def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
     assert "loop, in force: 4" in call.out and "loop, gains alone:" in call.out
     assert Call(["tune", "--undo", str(kept)], node).code == 0 and node.parameters() == written
     kept.write_text('{"kp": 5}')
-    assert "has no gains and filters" in sentence(Call(["tune", "--undo", str(kept)], node), 1)
+    assert "has no gains and filters" in sentence(Call(["tune", "--undo", str(kept)], node), 2)
     node.force("kp", 100 * written["kp"])
     refused = sentence(Call(["tune", str(record), "--check"], node), 1)
     assert "has a phase margin of 6 degrees" in refused and "set kp to 1." in refused
@@ -356,7 +356,7 @@ def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
     [
         ("--check --bandwidth 40Hz", "--check and --bandwidth do not go together"),
         ("--check --write", "--check and --write do not go together"),
-        ("--method response", "FILE and --method response do not go together"),
+        ("--method response", "--method response and FILE do not go together"),
         ("--method guess", "there is no method 'guess'"),
         ("--keep before.json", "--keep goes with --write"),
         ("--undo before.json", "--undo and file do not go together"),

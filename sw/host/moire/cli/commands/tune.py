@@ -43,7 +43,7 @@ def contradiction(given: Mapping[str, Any]) -> str | None:
     if given["check"] and given["bandwidth"] is not None:
         return "--check and --bandwidth do not go together: the axis has its gains"
     if given["file"] and given["method"] == RESPONSE:
-        return "FILE and --method response do not go together: the response is measured now"
+        return "--method response and FILE do not go together: the response is measured now"
     if given["keep"] and not given["write"]:
         return "--keep goes with --write: nothing is replaced"
     return None
