@@ -173,8 +173,8 @@ def logic_first(design: Design) -> tuple[list[Statement], list[Statement]]:
         count = len(stays)
         for n in moved:
             effect = design.program[n].effect
-            needs = effect.needs - computed
-            if (needs - set(design.locals)) & later or needs & unknown:
+            read = effect.needs - computed
+            if (read - set(design.locals)) & later or read & unknown:
                 stays.add(n)
             computed |= effect.sets
         if len(stays) == count:
