@@ -19,7 +19,7 @@ from tools import ROOT
 OUT = ROOT / "build" / "docs"
 SOURCE, SITE = OUT / "source", OUT / "site"
 TOOLS = ROOT / "build" / "docs_tools"  # of tools/docs.lock
-PAGES = ("*.md", "docs/*.md", "docs/**/*.md", "rtl/README.md", "sw/host/README.md")
+PAGES = ("*.md", "docs/*.md", "docs/**/*.md", "rtl/README.md", "sw/*/README.md")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^```.*?^```", re.M | re.S)
 REFERENCE = {  # pages of the reference, and their modules

@@ -107,6 +107,7 @@ module one_axis_bench (
         .block_up,
         .block_down,
         .closed_loop,
+        .enabled      (1'b0),
         .play,
         .arm,
         .controlled_stop,

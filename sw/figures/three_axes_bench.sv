@@ -86,6 +86,9 @@ module three_axes_bench (
             .rate_restart      (1'b0),
             .rate_steep        (1'b0),
             .line_stopped,
+            // without streamed set-points
+            .stream_state      (32'd0),
+            .stream_counts     (32'd0),
             // without a shared chain
             .chain_setting_written,
             .chain_harmonic_enable,

@@ -115,4 +115,4 @@ def written_commands():
 @pytest.mark.parametrize("line", list(written_commands()))
 def test_every_command_on_a_page_is_understood(line):
     arguments = shlex.split(line, comments=True)[1:]
-    assert command_line.parse_call(arguments)
+    assert command_line.parse_call(arguments, command_line.described(arguments))

@@ -437,7 +437,7 @@ def test_the_asynchronous_axis_has_the_methods_of_the_blocking_one():
         *("room_of_stream", "to_target", "motion", "stopping_on_error", "wait", "reached"),
         *("stop_if_enabled", "has_sine", "request", "feedback", "write_feedback", "to_nm"),
         *("to_counts", "read_period", "parameter_value", "parameter_counts", "write_parameter"),
-        *("check_together", "check_parameters"),
+        *("check_inside", "check_together", "check_parameters"),
     }
     public = {
         name

@@ -119,7 +119,7 @@ def test_settings_are_real_units_and_words():
     ):
         with pytest.raises(OutOfRange):
             panel.settings.set(name, value)
-    with pytest.raises(UnknownName, match="turn_tolerance, turn_allowance"):
+    with pytest.raises(UnknownName, match="did you mean turn_tolerance"):
         panel.settings.get("tolerance")
 
 

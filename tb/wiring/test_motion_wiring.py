@@ -21,7 +21,7 @@ def play(node, axis, velocity, ticks):
 
 def test_the_node_reports_what_it_is(node):
     build = node.fields("node.build")
-    assert build == {"axes": 3, "address": 5, "memory": 4}
+    assert build == {"axes": 3, "address": 5, "memory": 4, "scope": 0}
     assert node.read("node.clk_hz") == CLK_HZ
     first = node.now, node.read("node.time_stamp")
     node.run(1000)
@@ -32,6 +32,7 @@ def test_the_node_reports_what_it_is(node):
 
 def test_each_axis_reports_what_it_is_built_with(node):
     full = dict.fromkeys(node.fields("axis.built"), 1) | {"filters": 2, "segments": 255}
+    full |= {"set_points": 0}
     assert node.fields("axis.built", 0) == full
     assert node.fields("axis.built", 1) == full | {"capture": 0}
     assert node.fields("axis.built", 2) == dict.fromkeys(full, 0)

@@ -384,6 +384,7 @@ def recorded(
 ) -> Response:
     """The response by some records, each with a motion of its own.
 
+    All motions lie between the position of the axis and `way_nm` above it, with `soft` a tenth more.
     With `soft`, which makes the gains smaller, all motions go up, and the axis comes to their
     beginning from below with its own gains: then friction has its sign already, and makes no error.
     """
@@ -391,16 +392,20 @@ def recorded(
     period_s, every = length * excitation.tick_s, excitation.sparse
     way_nm = speed_nm_s * (SETTLING_PERIODS + PERIODS + 2) * period_s
     scope.load(excitation.values)
+    origin_nm = float(axis.status().position_nm)
+    low_nm = origin_nm if soft is None else origin_nm + 0.1 * way_nm
     errors, commands = [], []
     for number in range(records):
-        up = soft is not None or number % 2 == 0
-        if speed_nm_s and soft is not None:
-            if number:
-                axis.move(nm=-1.1 * way_nm, by=True)
-            axis.move(nm=0.1 * way_nm, by=True)
+        ends_nm = [low_nm, low_nm + way_nm]
+        if soft is None and number % 2:
+            ends_nm.reverse()
+        if speed_nm_s:
+            if soft is not None:
+                axis.move(nm=origin_nm)
+            axis.move(nm=ends_nm[0])
         with nullcontext() if soft is None else soft():
             if speed_nm_s:
-                axis.begin_move(nm=way_nm if up else -way_nm, by=True)
+                axis.begin_move(nm=ends_nm[1])
                 axis.dwell(STARTING_S)
             with scope.excited(length):
                 axis.dwell(SETTLING_PERIODS * period_s)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The options that every command takes, and one that several share."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -48,6 +49,12 @@ class Common(click.Option):
 
     def __init__(self, *names: str, **settings: Any) -> None:
         super().__init__(names, callback=remember, expose_value=False, **settings)
+        self.settings = settings
+
+    def without(self, taken: Collection[str]) -> "Common":
+        """This option without the names that a command has for an option of its own."""
+        left = [name for name in self.opts if name not in taken]
+        return self if len(left) == len(self.opts) else Common(*left, **self.settings)
 
 
 def remember(context: click.Context, option: click.Parameter, value: Any) -> None:

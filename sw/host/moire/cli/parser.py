@@ -109,7 +109,8 @@ class Command(Parsed):
     ) -> None:
         """`check` returns what is wrong with the arguments together, or None."""
         super().__init__(name, help=help, short_help=help, epilog=f"example: {example}", **settings)
-        self.params += COMMON
+        own = {name for option in self.params for name in option.opts}
+        self.params += [each.without(own) for each in COMMON]
         self.example, self.check = example, check
         self.allow_extra_args = True  # invoke() refuses them in a better sentence
 
