@@ -59,7 +59,7 @@ const char* const NAMES[CAUSES] = {
     "limit_low",     "limit_high",     "estop",        "following_error",  "encoder",
     "bus_watchdog",  "drive",          "cpu",          "profile_underrun", "step_overrun",
     "servo_overrun", "sample_overrun", "link_watchdog"};
-constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU};
+constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU, LINK};
 constexpr unsigned LATCH_ALWAYS = 1 << ESTOP | 1 << DRIVE | 1 << CPU;
 
 struct Window {  // cycles in which a cause may switch the drive off
@@ -142,6 +142,7 @@ struct Bench {
         case LIMIT_HIGH: pins->limit_high_open = on; break;
         case ESTOP: pins->estop = on; break;
         case WATCHDOG: pins->watchdog_expired = on; break;
+        case LINK: pins->link_expired = on; break;
         case DRIVE: pins->drive_fault_n = !on; break;
         case CPU: pins->cpu_stopped = on; break;
         default: break;
@@ -329,7 +330,7 @@ struct Campaign {
         std::map<Cause, Window> causes;
         const int64_t since = b.now, end = b.now + LIMIT_CYCLES + 2 * b.period;
         if (!b.pins->drive_enable) return fail("drive off without a cause");
-        const Cause other = LEVELS[random.below(6)];
+        const Cause other = LEVELS[random.below(std::size(LEVELS))];
         const int64_t later = b.now + (random.one_in(3) ? 0 : random.below(b.period));
         const bool two = random.one_in(2) && other != cause;
         b.off_at = NEVER;

@@ -47,6 +47,8 @@ module one_axis_bench (
     wire [31:0] stored_value, wdata_low, settings, live, feedback_rdata, actuator_rdata;
     wire [2:0] result_axis, result_kind;
     wire pending, moves, moved, request_waits, overrun;
+    wire [31:0] tick_count, stream_state, stream_counts;
+    wire unused_stream = &{1'b0, tick_count};
     wire step_made, step_down, block_up, block_down, closed_loop, play, arm, controlled_stop;
     wire hold_target, result_valid, result_flag;
     wire [47:0] position, moved_by, result;
@@ -107,7 +109,10 @@ module one_axis_bench (
         .block_up,
         .block_down,
         .closed_loop,
-        .enabled      (1'b0),
+        .enabled      (drive_enable),
+        .tick_count,
+        .stream_states(stream_state),
+        .stream_counts,
         .play,
         .arm,
         .controlled_stop,
@@ -209,6 +214,8 @@ module one_axis_bench (
         .rate_restart,
         .rate_steep,
         .line_stopped,
+        .stream_state,
+        .stream_counts,
         .chain_setting_written,
         .chain_harmonic_enable,
         .chain_learn,
