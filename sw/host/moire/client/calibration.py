@@ -85,11 +85,14 @@ def ends_of_stroke(axis: Axis, stroke: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def end_calibration(axis: Axis, velocity: ParameterValue) -> None:
-    """Freezes the correction and restores the velocity, as far as that is possible.
+    """Freezes the correction and restores the velocity, as far as that is possible. An axis that
+    still moves is stopped first: the velocity does not change during a motion.
 
     An error here is dropped, since the one that ended the calibration explains more.
     """
     try:
+        if axis.status().in_motion:
+            axis.stop_and_wait()
         axis.calibration("freeze")
         axis.write_parameter("velocity", velocity.counts)
     except MoireError:
