@@ -384,7 +384,8 @@ def recorded(
 ) -> Response:
     """The response by some records, each with a motion of its own.
 
-    All motions lie between the position of the axis and `way_nm` above it, with `soft` a tenth more.
+    All motions lie between the position of the axis and `way_nm` above it, with `soft` a tenth
+    more.
     With `soft`, which makes the gains smaller, all motions go up, and the axis comes to their
     beginning from below with its own gains: then friction has its sign already, and makes no error.
     """
