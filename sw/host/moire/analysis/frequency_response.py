@@ -384,20 +384,19 @@ def recorded(
 ) -> Response:
     """The response by some records, each with a motion of its own.
 
-    All motions lie between the position of the axis and `way_nm` above it, with `soft` a tenth
-    more.
-    With `soft`, which makes the gains smaller, all motions go up, and the axis comes to their
-    beginning from below with its own gains: then friction has its sign already, and makes no error.
+    All motions lie within a stroke above the position of the axis, a tenth more with `soft`. With
+    `soft`, which makes the gains smaller, all motions go up, and the axis comes to their beginning
+    from below with its own gains: then friction has its sign already, and makes no error.
     """
     scope, length = TickScope(axis), len(excitation.values)
     period_s, every = length * excitation.tick_s, excitation.sparse
-    way_nm = speed_nm_s * (SETTLING_PERIODS + PERIODS + 2) * period_s
+    stroke_nm = speed_nm_s * (SETTLING_PERIODS + PERIODS + 2) * period_s
     scope.load(excitation.values)
     origin_nm = float(axis.status().position_nm)
-    low_nm = origin_nm if soft is None else origin_nm + 0.1 * way_nm
+    low_nm = origin_nm if soft is None else origin_nm + 0.1 * stroke_nm
     errors, commands = [], []
     for number in range(records):
-        ends_nm = [low_nm, low_nm + way_nm]
+        ends_nm = [low_nm, low_nm + stroke_nm]
         if soft is None and number % 2:
             ends_nm.reverse()
         if speed_nm_s:
