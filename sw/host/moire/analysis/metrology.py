@@ -13,7 +13,6 @@ target minus position, as everywhere in this project. `moire.analysis.metrology_
 results.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy
@@ -46,13 +45,13 @@ class Density:
     @property
     def amplitude(self) -> Array:
         """The square root of the density, in the unit per sqrt(Hz)."""
-        return numpy.sqrt(self.power)
+        return numpy.asarray(numpy.sqrt(self.power))
 
     @property
     def cumulative_rms(self) -> Array:
         """The rms of all that happens up to each frequency; the last one is the rms of all."""
         width_hz = self.frequency_hz[1] - self.frequency_hz[0]
-        return numpy.sqrt(numpy.cumsum(self.power) * width_hz)
+        return numpy.asarray(numpy.sqrt(numpy.cumsum(self.power) * width_hz))
 
 
 def density(values: ArrayLike, rate_hz: float, segments: int = SEGMENTS) -> Density:
@@ -76,7 +75,8 @@ def density(values: ArrayLike, rate_hz: float, segments: int = SEGMENTS) -> Dens
     power *= 2 / (rate_hz * (window**2).sum())
     if length % 2 == 0:
         power[-1] /= 2  # the line at half the rate has no twin at a negative frequency
-    return Density(numpy.fft.rfftfreq(length, 1 / rate_hz)[1:], power[1:])
+    frequency_hz = numpy.asarray(numpy.fft.rfftfreq(length, 1 / rate_hz), float)
+    return Density(frequency_hz[1:], power[1:])
 
 
 def allan_deviation(values: ArrayLike, rate_hz: float) -> tuple[Array, Array]:
@@ -188,15 +188,16 @@ class Positioning:
 # ------------------------------------------------------------------ motion and signals
 
 
-def settling_time(time_s: Sequence[float], error: Sequence[float], window: float) -> float | None:
+def settling_time(time_s: ArrayLike, error: ArrayLike, window: float) -> float | None:
     """The time after which the error stays inside the window (at most `window`, either sign),
     counted from the first of these times; None if the last error is outside.
     """
+    times = numpy.asarray(time_s, float)
     outside = numpy.flatnonzero(numpy.abs(error) > window)
     if not len(outside):
         return 0.0
     settled = int(outside[-1]) + 1
-    return None if settled == len(time_s) else float(time_s[settled] - time_s[0])
+    return None if settled == len(times) else float(times[settled] - times[0])
 
 
 def harmonics(turns: ArrayLike, error: ArrayLike, orders: int) -> Array:

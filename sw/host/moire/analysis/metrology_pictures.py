@@ -78,7 +78,7 @@ def settling(times_s: Mapping[str, Sequence[float]], window_nm: float) -> bytes:
         panel.step(ordered, share, where="post", color=report.colour(number), label=name)
     panel.set_xlabel(
         f"time from the end of the profile until the error stays within "
-        f"\N{PLUS-MINUS SIGN}{window_nm:g} nm / ms"
+        f"\N{PLUS-MINUS SIGN}{window_nm:.3g} nm / ms"
     )
     panel.set_ylabel("settled moves / %")
     panel.set_xlim(left=0)
@@ -87,15 +87,21 @@ def settling(times_s: Mapping[str, Sequence[float]], window_nm: float) -> bytes:
     return report.png(figure)
 
 
-def harmonic_bars(amplitudes_nm: Mapping[str, ArrayLike], label: str = "amplitude / nm") -> bytes:
+def harmonic_bars(
+    amplitudes: Mapping[str, ArrayLike], label: str = "amplitude / nm", logarithmic: bool = False
+) -> bytes:
     """The amplitudes of the harmonics of several errors, side by side, from order 1 on."""
+    from matplotlib.ticker import MaxNLocator
+
     figure, (panel,) = report.drawing()
-    width = 0.8 / len(amplitudes_nm)
-    for number, (name, amplitudes) in enumerate(amplitudes_nm.items()):
-        heights = numpy.asarray(amplitudes, float)
+    width = 0.8 / len(amplitudes)
+    for number, (name, values) in enumerate(amplitudes.items()):
+        heights = numpy.asarray(values, float)
         places = numpy.arange(1, len(heights) + 1) + (number + 0.5) * width - 0.4
         panel.bar(places, heights, width, color=report.colour(number), label=name)
-    panel.xaxis.get_major_locator().set_params(integer=True)
+    if logarithmic:
+        panel.set_yscale("log")
+    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.set_xlabel("order")
     panel.set_ylabel(label)
     report.legend(figure, panel)

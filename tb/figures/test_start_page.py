@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""experiments.start_page: it links every report that is there, repeats its claim and what its model
+leaves out, and names the command of the others.
+"""
+
+import re
+from importlib.util import find_spec
+
+import pytest
+
+from experiments import start_page
+from experiments.report_page import text_of
+from moire.errors import BadFile
+
+RING = text_of("S1", "A ring.", [], {}, claim='12 < 13" <b>', left_out="drift & dust")
+
+
+def section(text, name):
+    return re.search(f'<section id="{name}">(.*?)</section>', text, re.S).group(1)
+
+
+def test_a_report_is_linked_with_its_claim_and_what_its_model_leaves_out(tmp_path):
+    path = start_page.publish("s1_ring", RING, tmp_path / "new")
+    assert path == tmp_path / "new" / "s1_ring.html" and path.read_text() == RING
+    ring = section((tmp_path / "new" / "index.html").read_text(), "s1_ring")
+    assert '<a href="s1_ring.html">S1: circular grating' in ring
+    assert "12 &lt; 13&#34; &lt;b&gt;" in ring
+    assert "The model leaves out: drift &amp; dust." in ring
+    assert re.search(r"Written \d{4}-\d\d-\d\d \d\d:\d\d; again: <code>build/venv", ring)
+
+
+def test_a_report_that_is_not_there_has_its_command_and_no_link(tmp_path):
+    text = start_page.write(tmp_path).read_text()
+    assert "href" not in text
+    for name, (title, command) in start_page.REPORTS.items():
+        shown = section(text, name)
+        assert title in shown and f"No report yet: <code>{command}</code>" in shown
+
+
+def test_every_report_of_an_experiment_is_named_after_its_module():
+    for name in start_page.REPORTS:
+        assert name == "figures" or find_spec(f"experiments.{name}"), name
+
+
+def test_a_page_that_says_nothing_of_itself_is_linked_all_the_same(tmp_path):
+    (tmp_path / "s2_stage.html").write_text("<html><head></head></html>")
+    shown = section(start_page.write(tmp_path).read_text(), "s2_stage")
+    assert 'href="s2_stage.html"' in shown and "leaves out" not in shown
+
+
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadFile, match="cannot be written"):
+        start_page.publish("s1_ring", RING, tmp_path / "file")
+
+
+def test_the_module_writes_the_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(start_page.write, "__defaults__", (tmp_path,))
+    assert start_page.main() == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'index.html'}\n"
