@@ -25,10 +25,11 @@ if TYPE_CHECKING:
     from experiments.s0_stage import Stage
 
 RATE_HZ = 4000.0  # of the traces
-STEPS = 16  # over a signal period, each STEP_NM and a STEPSth of the period long
+STEPS = 16  # even; up and down by STEP_NM, and each a STEPSth of a signal period further
 STEP_NM = 50_000.0
 READINGS = 4  # of the encoder at each step
 ORDERS = 6  # of the errors within a signal period
+FINAL_S = 0.005
 TARGETS = 5  # at least, by ISO 230-2
 APPROACH_NM = 100_000.0  # beyond the first and the last target, before the direction changes
 
@@ -59,7 +60,7 @@ class Metrology:
     def go(self, target_nm: float) -> float:
         """Moves to a target, which begins at a sync; returns the error when the node reports the
         end. The settling time is counted from the end of the profile until the true position stays
-        inside the window; a move that leaves it again has none.
+        inside the window around the position where it ends, the mean of the last FINAL_S.
         """
         axis, bus = self.stage.axes[self.name], self.stage.bus
         machine = self.stage.machine(self.name)
@@ -71,19 +72,24 @@ class Metrology:
         axis.wait(self.stage.record_while_moving(self.name))
         trace = self.stage.traced(self.name)
         after = trace["time_s"] >= end_s
-        error_nm = target_nm - trace["true_nm"][after]
-        settled = metrology.settling_time(trace["time_s"][after], error_nm, self.window_nm)
+        true_nm = trace["true_nm"][after]
+        final_nm = true_nm[-round(FINAL_S * RATE_HZ) :].mean()
+        settled = metrology.settling_time(
+            trace["time_s"][after], true_nm - final_nm, self.window_nm
+        )
         if settled is not None:
             self.settled_s.append(settled)
         return target_nm - self.stage.true_nm(self.name)
 
     def step(self, from_nm: float, label: str = "measured") -> None:
-        """Makes equal steps that end all over a signal period, and reads the encoder after each."""
+        """Makes steps up and down that end all over a signal period, and reads the encoder after
+        each.
+        """
         axis, period_nm = self.stage.axes[self.name], float(self.stage.axes[self.name].period_nm)
         turns, errors = [], []
         self.stage.move(self.name, from_nm)
         for number in range(1, STEPS + 1):
-            target_nm = from_nm + number * (STEP_NM + period_nm / STEPS)
+            target_nm = from_nm + number % 2 * STEP_NM + number * period_nm / STEPS
             self.go(target_nm)
             readings = [
                 float(axis.status().position_nm) - self.stage.true_nm(self.name)
@@ -113,7 +119,7 @@ class Metrology:
                 f"{self.still_nm.std():.2f} nm in {seconds:g} s"
             )
         if self.settled_s:
-            words[f"settling to within \N{PLUS-MINUS SIGN}{self.window_nm:.0f} nm"] = (
+            words[f"settling to within \N{PLUS-MINUS SIGN}{self.window_nm:.0f} nm of the end"] = (
                 f"median {1000 * np.median(self.settled_s):.1f} ms, "
                 f"longest of {len(self.settled_s)} {1000 * max(self.settled_s):.1f} ms"
             )

@@ -77,8 +77,8 @@ def settling(times_s: Mapping[str, Sequence[float]], window_nm: float) -> bytes:
         share = 100 * numpy.arange(1, len(ordered) + 1) / max(1, len(ordered))
         panel.step(ordered, share, where="post", color=report.colour(number), label=name)
     panel.set_xlabel(
-        f"time from the end of the profile until the error stays within "
-        f"\N{PLUS-MINUS SIGN}{window_nm:.3g} nm / ms"
+        f"time from the end of the profile until the position stays within "
+        f"\N{PLUS-MINUS SIGN}{window_nm:.3g} nm of its last one / ms"
     )
     panel.set_ylabel("settled moves / %")
     panel.set_xlim(left=0)
