@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Self
 
 from rich.console import Console
+from rich.status import Status
 from rich.table import Table as Rows
 
 from experiments import start_page
@@ -505,6 +506,11 @@ def displays(outcome: Outcome) -> str:
     return "<h2>Texts on the panel</h2>" + "".join(blocks)
 
 
+def shown_by(console: Console, status: Status) -> Callable[[str], None]:
+    """What shows the progress of a job: in its place on a terminal, elsewhere line by line."""
+    return status.update if console.is_terminal else console.print
+
+
 def run(
     count: int = 36,
     mode: str = MODES[0],
@@ -523,10 +529,11 @@ def run(
         console.status("building the twin") as status,
         IndexingMachine(seed, mode, random_worm(source)) as machine,
     ):
+        say = shown_by(console, status)
         machine.divide(count)
         outcome = machine.run(
             some_trouble(3.5 * count, source) if trouble else CALM,
-            lambda state: status.update(f"station {state.station + 1} of {count}"),
+            lambda state: say(f"station {state.station + 1} of {count}"),
         )
         lost = machine.twin.truth(SUB).lost_steps
         peer, sensor = machine.table.peer(), machine.table.sensor()

@@ -12,8 +12,8 @@ import pytest
 
 from boards import build
 from experiments import start_page
+from figures import comparison, record, synthesis, timing
 from figures import figure as command
-from figures import record, synthesis, timing
 from figures.common import Absent, Figure, Quick, collected, seeds, shares, within
 from tables import readme_figures
 
@@ -155,7 +155,7 @@ def test_the_table_refuses_a_record_of_another_bound():
 
 def test_signs_and_powers_are_typeset():
     text = "10^5 moves <= 3 um, +-2 arcsec, sum of 20 us"
-    assert readme_figures.typeset(text) == "10⁵ moves ≤ 3 µm, ±2″, sum of 20 µs"
+    assert comparison.typeset(text) == "10⁵ moves ≤ 3 µm, ±2″, sum of 20 µs"
 
 
 def test_lut4s_count_carry_cells_twice_and_lut_ram_six_times(tmp_path):

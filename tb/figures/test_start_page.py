@@ -3,6 +3,7 @@
 leaves out, and names the command of the others.
 """
 
+import ast
 import re
 from importlib.util import find_spec
 
@@ -11,6 +12,7 @@ import pytest
 from experiments import start_page
 from experiments.report_page import text_of
 from moire.errors import BadFile
+from twin.build import ROOT
 
 RING = text_of("S1", "A ring.", [], {}, claim='12 < 13" <b>', left_out="drift & dust")
 
@@ -46,6 +48,33 @@ def test_a_page_that_says_nothing_of_itself_is_linked_all_the_same(tmp_path):
     (tmp_path / "s2_stage.html").write_text("<html><head></head></html>")
     shown = section(start_page.write(tmp_path).read_text(), "s2_stage")
     assert 'href="s2_stage.html"' in shown and "leaves out" not in shown
+
+
+def strings(path):
+    """The texts of a module without its docstrings."""
+    tree = ast.parse(path.read_text())
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    docstrings = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, documented) and isinstance(node.body[0], ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if id(node) not in docstrings:
+                yield node.value
+
+
+@pytest.mark.parametrize("folder", ["sw/experiments", "sw/host/moire/analysis"])
+def test_reports_and_pictures_write_micrometres_and_plus_minus_in_one_way(folder):
+    """A length that is typed, such as 4um, has no space before its unit."""
+    wrong = [
+        (path.name, text)
+        for path in sorted((ROOT / folder).glob("*.py"))
+        for text in strings(path)
+        if re.search(r" um\b|\+-(?!\w*\])", text)
+    ]
+    assert not wrong
 
 
 def test_a_folder_that_cannot_be_made_is_reported(tmp_path):

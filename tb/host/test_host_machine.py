@@ -20,6 +20,7 @@ from tables import faults
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
+from twin.compiled.node import FAULT
 
 TEXT = """\
 text = "a test machine"
@@ -261,6 +262,19 @@ def test_a_fault_is_explained_without_a_port():
     shown = Call("fault amplitude_low").out
     assert "an event of the encoder" in shown and "signal too small" in shown
     assert "did you mean following_error?" in sentence(Call("fault folowing_error"), 2)
+
+
+LATCHED = ("estop", "drive", "cpu")  # also while the drive is off
+
+
+@pytest.mark.parametrize("fault", LATCHED)
+def test_a_latched_fault_comes_with_what_to_do_about_that_fault(fault):
+    node = BusNode()
+    node.axes[0].causes = FAULT[fault]
+    node.run(1)
+    shown = Call("fault", node).out
+    assert remedies.of_faults((fault,)) in shown and "then 'moire reset'" in shown
+    assert sum(remedies.of_faults((other,)) in shown for other in LATCHED) == 1
 
 
 def test_every_fault_cause_and_reason_says_what_to_do():

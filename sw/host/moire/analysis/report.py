@@ -352,7 +352,10 @@ th, td {
   padding: .4rem .8rem; text-align: right; border-bottom: 1px solid #e8edf2;
   white-space: nowrap;
 }
-th { background: #eef2f6; position: sticky; top: 0; font-weight: 600; }
+th {
+  background: #eef2f6; position: sticky; top: 0; font-weight: 600; white-space: normal;
+  vertical-align: bottom;
+}
 th.text, td.text { text-align: left; white-space: normal; }
 tbody tr:last-child td { border-bottom: 0; }
 p.left-out { color: #48586a; font-size: .92rem; margin: .5rem 0 0; max-width: 46rem; }
