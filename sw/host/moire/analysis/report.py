@@ -374,7 +374,8 @@ p.left-out { color: #48586a; font-size: .92rem; margin: .5rem 0 0; max-width: 46
 
 
 def cell(text: object, tag: str = "td", kind: str = "") -> str:
-    """One cell of a table; `kind` is its class."""
+    """One cell of a table; `kind` is its class. A unit stays on the line of its slash."""
+    text = str(text).replace(" / ", " /\N{NO-BREAK SPACE}") if tag == "th" else text
     attribute = f' class="{kind}"' if kind else ""
     return f"<{tag}{attribute}>{html.escape(str(text))}</{tag}>"
 
