@@ -9,12 +9,22 @@ from importlib.util import find_spec
 
 import pytest
 
-from experiments import start_page
+from experiments import s2_stage, s3_zero, s4_job, start_page
 from experiments.report_page import text_of
+from figures import browser as chromium
+from moire.analysis import report
 from moire.errors import BadFile
 from twin.build import ROOT
 
 RING = text_of("S1", "A ring.", [], {}, claim='12 < 13" <b>', left_out="drift & dust")
+
+
+WIDEST = {  # what stands in the widest columns of a table
+    "move": "to point A, half a 16-bit counter above the origin",
+    "directions": "up, down, up, down",
+    "target / deg": "350.00000",
+    "true angle at the cut / deg": "350.00000",
+}
 
 
 def section(text, name):
@@ -75,6 +85,23 @@ def test_reports_and_pictures_write_micrometres_and_plus_minus_in_one_way(folder
         if re.search(r" um\b|\+-(?!\w*\])", text)
     ]
     assert not wrong
+
+
+@pytest.mark.parametrize("experiment", [s2_stage, s3_zero, s4_job])
+def test_the_widest_tables_fit_a_window_of_1200_pixels(experiment, tmp_path):
+    if reason := chromium.missing():
+        pytest.skip(reason)
+    filled = [WIDEST.get(name, "-000000") for name in experiment.HEAD]
+    text = text_of("A report", "", [report.table(experiment.HEAD, [filled], text_columns=2)], {})
+    path = start_page.publish("s2_stage", text, tmp_path)
+    with chromium.opened() as browser:
+        page = browser.new_page(viewport={"width": 1200, "height": 800})
+        page.goto(path.as_uri())
+        table = page.locator("section").first
+        widths = [
+            table.evaluate(f"element => element.{name}Width") for name in ("scroll", "client")
+        ]
+    assert widths[0] <= widths[1]
 
 
 def test_a_folder_that_cannot_be_made_is_reported(tmp_path):
