@@ -7,6 +7,7 @@ import importlib.metadata
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -765,6 +766,26 @@ def test_bash_completes_the_last_command_of_a_chain(typed, offered):
     )
     assert {row.removeprefix("plain,") for row in ended.stdout.split()} == offered
     assert set(completion.candidates(typed.removeprefix("moire "))) == offered
+
+
+@pytest.mark.parametrize(
+    "shell_name, words, offered",
+    [
+        ("zsh", {"COMP_WORDS": "moire home -- stat", "COMP_CWORD": "3"}, "status"),
+        ("fish", {"COMP_WORDS": "moire home -- stat", "COMP_CWORD": "stat"}, "status"),
+    ],
+)
+def test_zsh_and_fish_complete_the_last_command_too(shell_name, words, offered):
+    def ask(what):
+        return subprocess.run(
+            [sys.executable, "-m", "moire"],
+            env={**os.environ, **words, "_MOIRE_COMPLETE": f"{shell_name}_{what}"},
+            capture_output=True,
+            text=True,
+        ).stdout
+
+    assert offered in re.split(r"[\s,]", ask("complete"))
+    assert f"_MOIRE_COMPLETE={shell_name}_complete" in ask("source")
 
 
 # ------------------------------------------------------------------ files and the shell
