@@ -329,9 +329,12 @@ def picture(readings: Readings, angles: Array, before: Array, methods: Sequence[
 
 
 def bars(angles: Array, before: Array, methods: Sequence[Method]) -> bytes:
-    """A picture (PNG) of the harmonics before and after the correction."""
+    """A picture (PNG) of the harmonics before and after the correction, as many as the angles
+    carry.
+    """
+    orders = min(ORDERS, (len(angles) - 1) // 2)
     errors = {"before": before, **{method.name: method.left for method in methods}}
-    amplitudes = {name: harmonics(angles / 360, error, ORDERS) for name, error in errors.items()}
+    amplitudes = {name: harmonics(angles / 360, error, orders) for name, error in errors.items()}
     return harmonic_bars(amplitudes, "amplitude / arcsec", logarithmic=True)
 
 
