@@ -3,13 +3,12 @@
 what was measured last, docs/figures.toml.
 """
 
-import re
 import sys
 from importlib import import_module
 from pathlib import Path
 
 from figures.common import Figure, modules
-from figures.comparison import number
+from figures.comparison import number, typeset
 from figures.record import RECORD, Entry, read
 from tables import made_files
 
@@ -40,18 +39,12 @@ FIRST = (  # the modules of sw/figures in the order of the table; others follow
     "full_clock",
     "twin_speed",
 )
-SIGNS = {"<=": "≤", ">=": "≥", "+-": "±", "um": "µm", "us": "µs", " arcsec": "″", " - ": " − "}
-SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
-def typeset(text: str) -> str:
-    """With the signs and powers that README's readers expect instead of those of a terminal."""
-    for plain, sign in SIGNS.items():
-        at_word = r"(?![a-z])" if plain[-1].isalpha() else ""
-        before = r"(?<![a-z])" if plain[0].isalpha() else ""
-        text = re.sub(before + re.escape(plain) + at_word, sign, text)
-    text = re.sub(r"\^(-?\d+)", lambda power: power[1].translate(SUPERSCRIPTS), text)
-    return text.replace("|true position − target|", "true position − target").replace("|", "\\|")
+def cell(text: str) -> str:
+    """A text as a cell of a table in Markdown, typeset; bars of magnitudes would end the cell."""
+    text = typeset(text)
+    return text.replace("|target − true position|", "target − true position").replace("|", "\\|")
 
 
 def collected() -> dict[str, Figure]:
@@ -67,8 +60,8 @@ def row(name: str, figure: Figure, entry: Entry | None) -> str:
     if entry is None:
         measured = "not measured yet"
     else:
-        measured = typeset(f"{number(entry.value, figure.digits)} {entry.unit}".strip())
-    return f"| `{name}`: {typeset(figure.what)} | {measured} | {typeset(figure.bound_words)} |"
+        measured = cell(f"{number(entry.value, figure.digits)} {entry.unit}".strip())
+    return f"| `{name}`: {cell(figure.what)} | {measured} | {cell(figure.bound_words)} |"
 
 
 def sources(entries: dict[str, Entry]) -> str:

@@ -45,7 +45,7 @@ class S0Result:
     sample_hz: int
     zero_nm: float  # largest distance of a zero from a phase zero of the interferometer
     homing_s: float  # of both axes, one after the other
-    errors_nm: tuple[float, ...]  # true position - target of each move
+    errors_nm: tuple[float, ...]  # target - true position of each move
     moves_s: tuple[float, ...]  # duration of each move
     repeats: int  # of exchanges on the bus, after the search for nodes
     simulated_s: float

@@ -40,22 +40,15 @@ def text_of(
     parts: Sequence[str],
     facts: Mapping[str, object],
     numbers: Sequence[tuple[str, str]] = (),
+    claim: str = "",
+    left_out: str = "",
 ) -> str:
-    """A report. parts are HTML, facts {name: words}; numbers are (value, name), shown large."""
+    """A report. parts are HTML, facts {name: words}; numbers are (value, name), shown large.
+
+    `claim` is the result in one sentence, which the start page shows together with `left_out`, what
+    the model of the machine leaves out.
+    """
     whole = [Markup(part) for part in parts]
     values = {"title": title, "summary": summary, "numbers": numbers, "parts": whole}
-    return str(render("report.html", **values, facts=facts.items()))
-
-
-def page(
-    path: Path | str,
-    title: str,
-    summary: str,
-    parts: Sequence[str],
-    facts: Mapping[str, object],
-    numbers: Sequence[tuple[str, str]] = (),
-) -> Path:
-    """Writes a report; returns its path."""
-    text = text_of(title, summary, parts, facts, numbers)
-    written: Path = report.write_text(Path(path), text)
-    return written
+    head = Markup(report.meta(claim, left_out))
+    return str(render("report.html", **values, facts=facts.items(), head=head))

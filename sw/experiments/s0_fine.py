@@ -6,7 +6,7 @@ the piezo corrects the remaining error.
 
 The experiment powers up the X axis with a piezo on its table, homes it, calibrates the correction
 of sine and cosine in motion, homes it again with this correction, switches the fine stage on, makes
-random moves and writes build/report/s0_fine/index.html. The paper aims at 0.01 um.
+random moves and writes build/report/s0_fine.html. The paper aims at 0.01 um.
 
 The zero of an axis is its true position after a move to 0. On this stage it is 4.4 nm from a zero
 of the sine signal, because the correction removes a quadrature error of 2 degrees by rotating the
@@ -25,13 +25,14 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.s0_stage import LEFT_OUT, Stage, random_moves, table
+from experiments import start_page
+from experiments.s0_metrology import Metrology
+from experiments.s0_stage import LEFT_OUT, TRACE_HZ, Stage, random_moves, table
 from moire.analysis import report
 from moire.client.records import CalibrationState
 from moire.errors import MoireError
 from twin import WITH_SEGMENTS, BuildError
-from twin.build import ROOT
-from twin.machines.machine import MachineHandle, Trace
+from twin.machines.machine import Trace
 from twin.nodes.twin import drives
 
 REQUIRED_NM = 10.0  # the aim of the paper
@@ -44,8 +45,6 @@ FINE: Mapping[str, str | float] = {
 }
 ZERO_S = 0.2  # the position of the zero is averaged over this time
 HOLD_S = 1.0  # the jitter is measured over this time
-TRACE_HZ = 10_000
-FOLDER = ROOT / "build" / "report" / "s0_fine"
 
 
 @dataclass
@@ -82,23 +81,6 @@ class FineStage(Stage):
         for parameter, value in self.fine.items():
             self.axes[name].set_parameter(parameter, value)
 
-    def machine(self, name: str) -> MachineHandle:
-        """The model of this axis."""
-        return self.twin.machine(list(self.axes).index(name))
-
-    def watch(self, name: str, seconds: float) -> Trace:
-        """Lets time pass and returns the trace of the machine, see traced()."""
-        self.machine(name).trace(TRACE_HZ)
-        self.dwell(seconds)
-        return self.traced(name)
-
-    def traced(self, name: str) -> Trace:
-        """The trace until now; `true_nm` is the true position from the zero in nm."""
-        machine = self.machine(name)
-        trace = machine.take_trace()
-        machine.trace(0)
-        return {**trace, "true_nm": trace["position_m"] * 1e9 - self.zero_nm[name]}
-
     def watch_move(self, name: str, target_nm: float) -> tuple[report.Move, Trace]:
         """Moves an axis; returns the move and the trace of the machine."""
         self.machine(name).trace(TRACE_HZ)
@@ -114,7 +96,7 @@ def hand_over_picture(stage: FineStage, name: str, target_nm: float) -> bytes:
     stroke of the piezo.
     """
     _, trace = stage.watch_move(name, target_nm)
-    error = trace["true_nm"] - target_nm
+    error = target_nm - trace["true_nm"]
     near = max(0, int(np.flatnonzero(np.abs(error) > 2000)[-1]))
     time_ms = (trace["time_s"][near:] - trace["time_s"][near]) * 1000
     figure, (whole, close) = report.drawing(height=3.6, ncols=2)
@@ -124,7 +106,7 @@ def hand_over_picture(stage: FineStage, name: str, target_nm: float) -> bytes:
             error[near:],
             color=report.colour(0),
             linewidth=1.2,
-            label="true position - target",
+            label="target - true position",
         )
         panel.plot(
             time_ms,
@@ -141,7 +123,7 @@ def hand_over_picture(stage: FineStage, name: str, target_nm: float) -> bytes:
 
 
 def run(
-    seed: int = 1, count: int = 24, folder: Path = FOLDER, console: Console | None = None
+    seed: int = 1, count: int = 24, folder: Path = start_page.FOLDER, console: Console | None = None
 ) -> tuple[list[report.Move], Path]:
     """Runs the whole experiment and returns the moves and the path of the report."""
     console = console or Console()
@@ -162,7 +144,8 @@ def run(
         task = progress.add_task("moves", total=count)
         moves = random_moves(stage, count, seed, done=lambda move: progress.advance(task))
     console.print(table(moves))
-    jitter = float(np.std(stage.watch("X", HOLD_S)["true_nm"]))
+    measured = Metrology(stage, "X")
+    jitter = float(np.std(measured.stand_still(HOLD_S)))
     picture = hand_over_picture(stage, "X", moves[-1].target_nm + 2e5)
     errors = report.Errors.of(moves)
     result = report.Result(
@@ -170,7 +153,13 @@ def run(
         seed=seed,
         moves=moves,
         paper_error_nm=REQUIRED_NM,
-        drawn={"hand_over": ("The end of a move: the motor hands over to the piezo", picture)},
+        drawn={
+            "hand_over": ("The end of a move: the motor hands over to the piezo", picture),
+            **measured.pictures(),
+        },
+        claim=f"Largest error {errors.largest:.1f} nm, rms {errors.rms:.2f} nm in {errors.count} "
+        f"random moves, {jitter:.2f} nm rms at standstill; the paper aims at 10 nm.",
+        left_out=LEFT_OUT,
         summary="The simulation of the X axis runs the same RTL and firmware as the FPGA, with a "
         "model of the stage and of the piezo on its table (hysteresis, creep, a mode at 500 Hz). "
         "The true position is the position of the model; no controller can see it.",
@@ -190,11 +179,10 @@ def run(
             ),
             "simulated time": f"{stage.bus.transport.now():.2f} s",
             "wall time": f"{time.perf_counter() - began:.1f} s",
-            "what the model leaves out": LEFT_OUT,
             "again": f"build/venv/bin/python -m experiments.s0_fine --seed {seed} --moves {count}",
         },
     )
-    path = report.write(result, folder)
+    path = start_page.publish("s0_fine", report.page(result), folder)
     stage.axes["X"].disable()
     console.print(
         f"largest error {errors.largest:.1f} nm, rms {errors.rms:.2f} nm (paper's aim: 10 nm); "
@@ -219,8 +207,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--report",
         type=Path,
-        default=FOLDER,
-        help="directory of the page (default build/report/s0_fine)",
+        default=start_page.FOLDER,
+        help="directory of the page (default build/report)",
     )
     options = parser.parse_args(arguments)
     if not 2 <= options.moves <= 10000:

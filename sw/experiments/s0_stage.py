@@ -5,8 +5,9 @@ are on one RS-485 bus.
     python -m experiments.s0_stage            (make demo)
 
 The experiment powers up two nodes with their stages at unknown positions, finds and checks the
-nodes, homes both axes, makes a list of moves, in turn of X and of Y, and writes
-build/report/index.html. The paper reached 0.8 um with the motors alone.
+nodes, homes both axes, makes a list of moves, in turn of X and of Y, measures the X axis as a
+metrologist would, and writes build/report/s0_stage.html. The paper reached 0.8 um with the motors
+alone.
 """
 
 import argparse
@@ -22,19 +23,26 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from experiments import start_page
+from experiments.s0_metrology import Metrology, targets
 from moire.analysis import report
 from moire.client.axis import Axis
 from moire.client.bus import Bus
 from moire.client.records import CalibrationState, Identity, Status
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport
-from twin.build import ROOT
+from twin.machines.machine import MachineHandle, Trace
 from twin.nodes.twin import CLK_HZ, NODE
 
 ADDRESSES = {"X": 1, "Y": 2}  # on the bus; the axes of the twin have the same order
 PERIOD_NM = 800.0
 POLL_S = 0.005  # between two polls of a motion
 MOVES = 24
+TRACE_HZ = 10_000.0
+STILL_S, LONG_STILL_S = 1.0, 10.0  # the X axis holds its position
+STEPS_FROM_NM = 1e6
+TRAVEL_NM = (0.0, 20e6)  # of the test by ISO 230-2
+RUNS = 5  # of that test, in each direction
 STROKES = ("0.7mm", "0.3mm")  # targets of the strokes during the calibration
 MOST_STROKES = 30
 LEFT_OUT = (
@@ -144,6 +152,23 @@ class Stage:
             self.zero_nm[name] if from_zero else 0.0
         )
 
+    def machine(self, name: str) -> MachineHandle:
+        """The model of this axis."""
+        return self.twin.machine(list(self.axes).index(name))
+
+    def watch(self, name: str, seconds: float, rate_hz: float = TRACE_HZ) -> Trace:
+        """Lets time pass and returns the trace of the machine, see traced()."""
+        self.machine(name).trace(rate_hz)
+        self.dwell(seconds)
+        return self.traced(name)
+
+    def traced(self, name: str) -> Trace:
+        """The trace until now, which ends; `true_nm` is the true position from the zero in nm."""
+        machine = self.machine(name)
+        trace = machine.take_trace()
+        machine.trace(0)
+        return {**trace, "true_nm": trace["position_m"] * 1e9 - self.zero_nm[name]}
+
     def move(
         self, name: str, target_nm: float, progress: Callable[[Statuses], object] | None = None
     ) -> report.Move:
@@ -154,7 +179,7 @@ class Stage:
         )
         took = self.bus.transport.now() - began
         true = self.true_nm(name)
-        return report.Move(name, target_nm, status.position_nm, true, true - target_nm, took)
+        return report.Move(name, target_nm, status.position_nm, true, target_nm - true, took)
 
 
 def random_target(
@@ -243,7 +268,8 @@ def position_words(statuses: Statuses) -> str:
 def run(
     seed: int = 1,
     count: int = MOVES,
-    folder: Path = ROOT / "build" / "report",
+    folder: Path = start_page.FOLDER,
+    thorough: bool = False,
     console: Console | None = None,
 ) -> tuple[list[report.Move], Path]:
     """Runs the whole experiment and returns the moves and the path of the report."""
@@ -278,6 +304,8 @@ def run(
             progress.update(task, words=position_words(statuses))
 
         moves = random_moves(stage, count, seed, record, lambda move: progress.advance(task))
+        task = progress.add_task("metrology", total=None, words="standstill, steps")
+        measured = measure(stage, seed, thorough, lambda words: progress.update(task, words=words))
     margins = ", ".join(
         f"{name} {axis.encoder().home_margin:.2f}" for name, axis in stage.axes.items()
     )
@@ -292,21 +320,25 @@ def run(
         moves=moves,
         traces=recorder.traces(),
         lissajous=recorder.lissajous(),
+        drawn=measured.pictures(),
+        claim=f"Largest error {errors.largest:.1f} nm, rms {errors.rms:.1f} nm in {errors.count} "
+        "random moves with the motors alone; the paper's real stage kept 800 nm.",
+        left_out=LEFT_OUT,
         summary="Two axis nodes are on one RS-485 bus. The simulation runs the same RTL and "
         "firmware as the FPGA, with a model of the stage. The motors position the stage without "
         "a piezo. The true position is the position of the model; no controller can see it.",
         compared=[
             report.Compared(
                 "coarse positioning error, motor only",
-                "below 0.8 um",
-                f"{errors.largest / 1000:.3f} um",
+                "below 0.8 \N{MICRO SIGN}m",
+                f"{errors.largest / 1000:.3f} \N{MICRO SIGN}m",
                 errors.largest < report.PAPER_ERROR_NM,
             ),
-            report.Compared("error, rms", "not given", f"{errors.rms / 1000:.4f} um"),
+            report.Compared("error, rms", "not given", f"{errors.rms / 1000:.4f} \N{MICRO SIGN}m"),
             report.Compared(
                 "resolution of the read-out",
-                "0.005 um (N = 160)",
-                "0.005 um (N = 160); any N to 65 536",
+                "0.005 \N{MICRO SIGN}m (N = 160)",
+                "0.005 \N{MICRO SIGN}m (N = 160); any N to 65 536",
                 True,
             ),
             report.Compared(
@@ -317,23 +349,44 @@ def run(
             ),
         ],
         facts={
+            **measured.words,
             "simulated time": f"{simulated:.2f} s",
             "wall time": f"{wall:.1f} s",
             "margin of the phase zero at homing (1: certain, 0: ambiguous)": margins,
             "bus": f"{stage.bus.statistics.exchanges} exchanges, "
             f"{stage.bus.statistics.repeats} repeated",
-            "what the model leaves out": LEFT_OUT,
-            "again": f"build/venv/bin/python -m experiments.s0_stage --seed {seed} --moves {count}",
+            "again": f"build/venv/bin/python -m experiments.s0_stage --seed {seed} --moves {count}"
+            + (" --thorough" if thorough else ""),
         },
     )
-    path = report.write(result, folder)
+    path = start_page.publish("s0_stage", report.page(result), folder)
     console.print(
         f"largest error {errors.largest:.1f} nm, rms {errors.rms:.1f} nm "
         "(the paper's real stage: below 800 nm); "
         f"{simulated:.1f} s simulated in {wall:.0f} s"
     )
     console.print(f"report with pictures: {path}", soft_wrap=True)
+    console.print(f"all reports: {path.with_name('index.html')}", soft_wrap=True)
     return moves, path
+
+
+def measure(
+    stage: Stage, seed: int, thorough: bool, say: Callable[[str], object] = lambda words: None
+) -> Metrology:
+    """Measures the X axis: standstill, steps over a signal period, and in a thorough measurement
+    also the steps after a calibration, and a test by ISO 230-2.
+    """
+    measured = Metrology(stage, "X")
+    measured.stand_still(LONG_STILL_S if thorough else STILL_S)
+    measured.step(STEPS_FROM_NM, "before the calibration")
+    if thorough:
+        say("calibration")
+        stage.calibrate_ellipse("X")
+        stage.home("X")
+        measured.step(STEPS_FROM_NM, "after the calibration")
+        say("ISO 230-2")
+        measured.run_iso_230_2(targets(*TRAVEL_NM, seed), RUNS)
+    return measured
 
 
 def table(moves: Sequence[report.Move]) -> Table:
@@ -344,7 +397,7 @@ def table(moves: Sequence[report.Move]) -> Table:
             f"{title}"
             for title in ("target / mm", "encoder / mm", "true / mm", "error / nm", "time / s")
         ),
-        title="moves, error = true position - target",
+        title="moves, error = target - true position",
     )
     for column in made.columns[1:]:
         column.justify = "right"
@@ -373,14 +426,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--report",
         type=Path,
-        default=ROOT / "build" / "report",
+        default=start_page.FOLDER,
         help="directory of the page (default build/report)",
+    )
+    parser.add_argument(
+        "--thorough",
+        action="store_true",
+        help="adds ten seconds of standstill, a calibration, and a test of the X axis by ISO 230-2 "
+        "over its travel: some minutes",
     )
     options = parser.parse_args(arguments)
     if not 1 <= options.moves <= 10000:
         parser.error(f"--moves takes 1 to 10000, not {options.moves}")
     try:
-        run(options.seed, options.moves, options.report)
+        run(options.seed, options.moves, options.report, options.thorough)
     except (MoireError, BuildError) as error:
         print(f"s0_stage: {error}", file=sys.stderr)
         return int(getattr(error, "exit_code", 1))

@@ -24,9 +24,11 @@ from numpy.typing import ArrayLike, NDArray
 from rich.console import Console
 from rich.table import Table
 
-from experiments import report_page
+from experiments import report_page, start_page
 from moire.analysis import report
 from moire.analysis.harmonic_fit import Harmonics, Readings, fit, read_readings
+from moire.analysis.metrology import harmonics
+from moire.analysis.metrology_pictures import harmonic_bars
 from moire.bus.transport import BITS, Transport
 from moire.client.relay import Relay, Settings, Status, make_set, terms_of
 from moire.errors import BadFile, MoireError
@@ -48,6 +50,7 @@ SCATTER = 2.0
 SCATTER_RMS = SCATTER / 3**0.5
 TEN_DEGREES = np.arange(0.0, 361.0, 10.0)
 DWELL_S = 15.0  # from one reading to the next
+LEFT_OUT = "orders above 16, jitter of the read head"
 EARLY = 400  # at power-up the ring is at rest this many counts before its index
 HIGH_ORDERS = slice(PAPER_ORDERS + 1, None)
 
@@ -325,6 +328,16 @@ def picture(readings: Readings, angles: Array, before: Array, methods: Sequence[
     return report.png(figure)
 
 
+def bars(angles: Array, before: Array, methods: Sequence[Method]) -> bytes:
+    """A picture (PNG) of the harmonics before and after the correction, as many as the angles
+    carry.
+    """
+    orders = min(ORDERS, (len(angles) - 1) // 2)
+    errors = {"before": before, **{method.name: method.left for method in methods}}
+    amplitudes = {name: harmonics(angles / 360, error, orders) for name, error in errors.items()}
+    return harmonic_bars(amplitudes, "amplitude / arcsec", logarithmic=True)
+
+
 def page(
     seed: int,
     readings: Readings,
@@ -341,19 +354,20 @@ def page(
         (f"{methods[0].peak:.2f}{second}", "after, the paper's method"),
         (f"{len(angles)}", "angles of the second pass"),
     ]
-    compared: list[Sequence[report.Cell]] = [
-        (
-            "largest error before",
-            f"{PAPER_PEAK}{second}",
-            f"{np.abs(before).max():.2f}{second}",
-            report.verdict(None),
+    compared = [
+        report.Compared(
+            "largest error before", f"{PAPER_PEAK}{second}", f"{np.abs(before).max():.2f}{second}"
         )
     ]
-    for method in methods:
-        reached = report.verdict(method.peak < PAPER_AFTER)
-        compared.append(
-            (method.name, f"{PAPER_AFTER}{second}", f"{method.peak:.2f}{second}", reached)
+    compared += [
+        report.Compared(
+            f"largest error after, {method.name}",
+            f"{PAPER_AFTER}{second}",
+            f"{method.peak:.2f}{second}",
+            method.peak < PAPER_AFTER,
         )
+        for method in methods
+    ]
     rows = [
         (f"{angle:.3f}", f"{raw:+.2f}", *(f"{method.left[n]:+.2f}" for method in methods))
         for n, (angle, raw) in enumerate(zip(angles, before, strict=True))
@@ -365,11 +379,15 @@ def page(
     )
     drawn = picture(readings, angles, before, methods)
     parts = [
-        "<h2>Against the paper</h2>",
-        report.table(report.AGAINST_THE_PAPER, compared),
+        report.against_the_paper(compared, LEFT_OUT),
         "<h2>Before and after</h2>",
         report_page.picture(
             "error", "Error over the turn: angle at the output of the relay minus true angle", drawn
+        ),
+        report_page.picture(
+            "harmonics",
+            "Amplitudes of the orders of the error over the turn: eccentricity is order 1",
+            bars(angles, before, methods),
         ),
         "<h2>Second pass</h2>",
         report.table(head, rows, tall=True),
@@ -384,20 +402,24 @@ def page(
         "relay": f"RTL, Verilated, {ORDERS} orders; the set {status.identity:08X} was written over "
         "its UART",
         "fit": best.found.words(),
-        "what the model leaves out": "orders above 16, jitter of the read head",
     }
     summary = (
         "The host fits 37 readings of a simulated ring and writes the coefficients into the relay. "
         "Then the counts at the output of the relay are compared with the true angles."
     )
     title = "S1: circular grating, corrected on the fly"
-    return report_page.text_of(title, summary, parts, facts, numbers)
+    claim = (
+        f"The relay reduces an error of {np.abs(before).max():.2f}{second} to "
+        f"{best.peak:.2f}{second}; "
+        f"the paper's real ring came from {PAPER_PEAK}{second} to {PAPER_AFTER}{second}."
+    )
+    return report_page.text_of(title, summary, parts, facts, numbers, claim, LEFT_OUT)
 
 
 def run(
     seed: int = 1,
     places: int = 180,
-    folder: Path = ROOT / "build" / "report",
+    folder: Path = start_page.FOLDER,
     console: Console | None = None,
 ) -> tuple[list[Method], Path]:
     """Runs the whole experiment and returns both methods and the path of the report."""
@@ -436,8 +458,8 @@ def run(
     ):
         made.add_row(name, f"{value:.2f}")
     console.print(made)
-    path = folder / "s1_ring.html"
-    path.write_text(page(seed, readings, angles, before, methods, status), encoding="utf-8")
+    text = page(seed, readings, angles, before, methods, status)
+    path = start_page.publish("s1_ring", text, folder)
     console.print(f"report with picture: {path}", soft_wrap=True)
     return methods, path
 
@@ -460,7 +482,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--report",
         type=Path,
-        default=ROOT / "build" / "report",
+        default=start_page.FOLDER,
         help="directory of the page (default build/report)",
     )
     options = parser.parse_args(arguments)

@@ -6,7 +6,7 @@
 The experiment homes all three axes with the switch and the index (method 1) and sets the origin to
 the middle of each travel. It moves at 30 mm/min and faster, to both sides of the origin and beyond
 the range of a 16-bit and of a 32-bit counter, and compares the counts of every move with the pulses
-of the scale. It writes build/report/s2.html.
+of the scale. It writes build/report/s2_stage.html.
 
 The clock frequency of the node limits the speed of the scale: the node counts one count per cycle.
 The twin runs at 4.8 MHz, and here X and Y move at 100 mm/s and Z at 25 mm/s. The figure
@@ -26,7 +26,8 @@ from typing import Self
 from rich.console import Console
 from rich.table import Table
 
-from experiments.report_page import page, picture
+from experiments import start_page
+from experiments.report_page import picture, text_of
 from moire.analysis import report
 from moire.client.axis import Axis as ClientAxis
 from moire.client.bus import Bus
@@ -34,7 +35,6 @@ from moire.client.records import Status
 from moire.errors import MoireError
 from moire.units import Value
 from twin import BuildError, Twin, TwinTransport
-from twin.build import ROOT
 from twin.nodes.twin import Axis, Node, drives
 
 CLK_HZ = 4_800_000  # the motion engine needs 1171 cycles a tick for three axes
@@ -42,7 +42,7 @@ NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 POLL_S = 0.02
 SLOW_MM_S = 0.5  # the paper's top speed, 30 mm/min
 WORD = 1 << 16  # range of the counter of the paper
-PAPER_SHARE = 1e-4  # relative error, compared with a digital read-out
+LEFT_OUT = "errors of the scales and of their edges, noise on the levels, temperature"
 
 
 @dataclass(frozen=True)
@@ -314,7 +314,7 @@ HEAD = (
     "pulses of the scale",
     "counted",
     "wrong",
-    "table minus node / um",
+    "table minus node / \N{MICRO SIGN}m",
     "counts",
     "16-bit counter",
     "direction",
@@ -374,7 +374,7 @@ def pictures(stage: Stage) -> str:
 
 def run(
     seed: int = 1,
-    path: Path = ROOT / "build" / "report" / "s2.html",
+    folder: Path = start_page.FOLDER,
     console: Console | None = None,
 ) -> tuple[list[Move], Path]:
     """Runs the whole experiment and returns the moves and the path of the report."""
@@ -395,34 +395,25 @@ def run(
         abs(move.apart_um) / (abs(move.counted) * float(SCALES[move.axis].count_um))
         for move in long
     )
-    compared: list[Sequence[report.Cell]] = [
-        (
-            "pulses of the scale minus pulses counted",
-            "0",
-            f"{wrong} of {pulses}",
-            report.verdict(wrong == 0),
+    compared = [
+        report.Compared(
+            "pulses of the scale minus pulses counted", "0", f"{wrong} of {pulses}", wrong == 0
         ),
-        (
-            "difference from a digital read-out, relative to the distance",
-            "within 1/10 000",
-            f"1/{1 / share:,.0f}".replace(",", " "),
-            report.verdict(share < PAPER_SHARE),
+        report.Compared(
+            "difference relative to the distance",
+            "within 1/10 000 of a digital read-out",
+            f"1/{1 / share:,.0f} of the model's scale".replace(",", " "),
         ),
-        (
-            "largest difference between table and node",
-            "not given",
-            f"{widest:.2f} counts",
-            report.verdict(None),
+        report.Compared(
+            "largest difference between table and node", "not given", f"{widest:.2f} counts"
         ),
-        (
+        report.Compared(
             "side of the origin",
             "sum of 10 ms readings, by a direction bit",
             "sign of the position",
-            report.verdict(None),
         ),
     ]
-    path = page(
-        path,
+    text = text_of(
         "S2: three axes with direct scale input",
         "The simulation of three stepper axes in one node runs the same RTL and firmware as the "
         "FPGA. Points A and B are half the range of a 16-bit counter above and below the origin. "
@@ -430,17 +421,19 @@ def run(
         "indicates only the direction of the last pulse. The position of the node has 48 bits and "
         "a sign.",
         [
-            report.table(report.AGAINST_THE_PAPER, compared),
+            report.against_the_paper(compared, LEFT_OUT),
             pictures(stage),
             report.table(HEAD, rows(made), text_columns=2),
         ],
         {
             "simulated time": f"{stage.bus.transport.now():.1f} s",
-            "what the model leaves out": "errors of the scales and of their edges, noise on the "
-            "levels, temperature",
             "again": f"build/venv/bin/python -m experiments.s2_stage --seed {seed}",
         },
+        claim=f"{wrong} of {pulses} pulses counted wrongly; the table and the position of the node "
+        f"differ by {widest:.2f} counts at most.",
+        left_out=LEFT_OUT,
     )
+    path = start_page.publish("s2_stage", text, folder)
     console.print(
         f"{wrong} of {pulses} pulses counted wrongly; "
         f"table and node differ by {widest:.2f} counts at most"

@@ -7,7 +7,7 @@ Two nodes run the firmware image `station`: the main node has the EEPROM, key-pa
 keyboard and the EDM machine, and the sub-node has the worm table and its angle sensor. An operator
 divides the turn on the panel and presses START; then the job runs unattended. Each cut is checked
 against the log of the EDM machine, which has the true angle of the table. The result is
-build/report/s4.html.
+build/report/s4_job.html.
 
 `--trouble` adds damaged sensor frames, garbage between the nodes, an operator who types, and a
 power failure, after which the operator answers.
@@ -27,9 +27,11 @@ from pathlib import Path
 from typing import Self
 
 from rich.console import Console
+from rich.status import Status
 from rich.table import Table as Rows
 
-from experiments.report_page import page, picture
+from experiments import start_page
+from experiments.report_page import picture, text_of
 from moire.analysis import report
 from moire.client.bus import Bus
 from moire.client.indexing_table import TURN, IndexingTable
@@ -40,7 +42,6 @@ from moire.client.settings import Settings
 from moire.errors import MoireError
 from moire.units import Value
 from twin import Axis, BuildError, Devices, Node, Twin, TwinTransport, build
-from twin.build import ROOT
 from twin.nodes.twin import drives
 
 MAIN, SUB = 0, 1  # numbers of the nodes in the twin
@@ -91,6 +92,7 @@ NEAR = 60  # arcsec: a cut farther away from every station belongs to none
 TABLE: dict[str, Value] = {"turn_settle": "40ms"}
 TOLERANCE = 2.0  # arcsec, as in the paper
 MODES = ("frames", "legacy")
+LEFT_OUT = "bending of the work piece, wear, temperature; errors of the sensor above 1 arcsec"
 
 PAD = """7 8 9 START PAUSE RESUME STOP
          4 5 6 AGAIN NEXT UP DOWN
@@ -123,7 +125,7 @@ class Cut:
     # the true angle in arcsec at the beginning or at the end, whichever has the larger error; at
     # the beginning if the table lost its power during the cut
     angle: float
-    error: float  # arcsec
+    error: float  # arcsec, target - angle
     start_s: float
     complete: bool
 
@@ -190,9 +192,9 @@ class Outcome:
         )
 
 
-def apart(angle: float, target: float) -> float:
-    """The difference of two angles in arcsec, within half a turn."""
-    return (angle - target + TURN / 2) % TURN - TURN / 2
+def apart(angle: float, other: float) -> float:
+    """One angle minus another in arcsec, within half a turn."""
+    return (angle - other + TURN / 2) % TURN - TURN / 2
 
 
 def random_worm(source: random.Random) -> dict[str, float]:
@@ -359,7 +361,7 @@ class IndexingMachine:
             if any(0 <= dark - cut.start_s <= CUT_S for dark in self.table_dark_s):
                 angles = angles[:1]
             angle = max(angles, key=lambda angle: abs(apart(angle, target)))
-            error = apart(angle, target)
+            error = apart(target, angle)
             found.append(
                 Cut(
                     station if abs(error) < NEAR else None,
@@ -475,7 +477,7 @@ def errors_picture(outcome: Outcome) -> str:
     )
     errors.set(
         xlabel="station / deg",
-        ylabel="true angle - target / arcsec",
+        ylabel="error (target \N{MINUS SIGN} true angle) / arcsec",
         title="error at the cut, and the tolerance",
         ylim=(-3, 3),
     )
@@ -504,12 +506,17 @@ def displays(outcome: Outcome) -> str:
     return "<h2>Texts on the panel</h2>" + "".join(blocks)
 
 
+def shown_by(console: Console, status: Status) -> Callable[[str], None]:
+    """What shows the progress of a job: in its place on a terminal, elsewhere line by line."""
+    return status.update if console.is_terminal else console.print
+
+
 def run(
     count: int = 36,
     mode: str = MODES[0],
     seed: int = 1,
     trouble: bool = False,
-    path: Path = ROOT / "build" / "report" / "s4.html",
+    folder: Path = start_page.FOLDER,
     console: Console | None = None,
 ) -> tuple[Outcome, Path]:
     """Runs the whole experiment and returns its outcome and the path of the report."""
@@ -522,10 +529,11 @@ def run(
         console.status("building the twin") as status,
         IndexingMachine(seed, mode, random_worm(source)) as machine,
     ):
+        say = shown_by(console, status)
         machine.divide(count)
         outcome = machine.run(
             some_trouble(3.5 * count, source) if trouble else CALM,
-            lambda state: status.update(f"station {state.station + 1} of {count}"),
+            lambda state: say(f"station {state.station + 1} of {count}"),
         )
         lost = machine.twin.truth(SUB).lost_steps
         peer, sensor = machine.table.peer(), machine.table.sensor()
@@ -537,29 +545,23 @@ def run(
         console.print(f"    [reverse]{line}[/]", highlight=False)
     for seconds, why, key in outcome.answers:
         console.print(f"after {seconds:.1f} s the panel showed '{why}'; the operator pressed {key}")
-    compared: list[Sequence[report.Cell]] = [
-        (
+    compared = [
+        report.Compared(
             "stations that were cut once",
             "not given",
             f"{count - len(outcome.uncut)} of {count}, {len(outcome.twice)} twice",
-            report.verdict(None),
         ),
-        (
+        report.Compared(
             "largest true error",
-            "+-2 arcsec",
+            f"\N{PLUS-MINUS SIGN}{TOLERANCE:g} arcsec",
             f"{outcome.worst:.2f} arcsec",
-            report.verdict(outcome.worst <= TOLERANCE),
+            outcome.worst <= TOLERANCE,
         ),
-        (
-            "tries",
-            "not given",
-            f"{max(outcome.tries.values(), default=0)} at most",
-            report.verdict(None),
-        ),
-        ("answers of the operator", "not given", str(len(outcome.answers)), report.verdict(None)),
+        report.Compared("tries", "not given", f"{max(outcome.tries.values(), default=0)} at most"),
+        report.Compared("answers of the operator", "not given", str(len(outcome.answers))),
     ]
     parts = [
-        report.table(report.AGAINST_THE_PAPER, compared),
+        report.against_the_paper(compared, LEFT_OUT),
         errors_picture(outcome),
         displays(outcome),
         report.table(HEAD, rows(outcome), text_columns=1),
@@ -572,8 +574,7 @@ def run(
                 [(f"{seconds:.1f}", why, key) for seconds, why, key in outcome.answers],
             ),
         )
-    path = page(
-        path,
+    text = text_of(
         "S4: the unattended indexing machine",
         "The simulation of two nodes runs the same RTL and firmware as the FPGA. One node has the "
         "panel, the EEPROM and the keyboard of the wire-EDM machine; the other turns the table "
@@ -582,8 +583,6 @@ def run(
         {
             "simulated time": f"{outcome.seconds:.0f} s",
             "worm": "random errors, backlash and sensor error, determined by the seed",
-            "what the model leaves out": "bending of the work piece, wear, temperature; errors of "
-            "the sensor above 1 arcsec",
             "steps lost": str(lost),
             "sensor frames": f"{sensor.frames}, {sensor.wrong_crc + sensor.broken} damaged",
             "between the nodes": f"{peer.heard} received, {peer.garbage} invalid, "
@@ -591,7 +590,12 @@ def run(
             "again": f"build/venv/bin/python -m experiments.s4_job --seed {seed} "
             f"--stations {count} --peers {mode}" + (" --trouble" if trouble else ""),
         },
+        claim=f"{count - len(outcome.uncut)} of {count} stations cut, {len(outcome.twice)} of them "
+        f"twice, with a true error of {outcome.worst:.2f} arcsec at most; the paper allows "
+        f"\N{PLUS-MINUS SIGN}{TOLERANCE:g} arcsec.",
+        left_out=LEFT_OUT,
     )
+    path = start_page.publish("s4_job", text, folder)
     console.print(f"{outcome.words}; ended {outcome.state.state}")
     console.print(f"report with pictures: {path}", soft_wrap=True)
     return outcome, path

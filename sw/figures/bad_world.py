@@ -102,7 +102,7 @@ def s0_coarse_bad_um(
     console.print(
         "error of the scales before: "
         + ", ".join(f"{name} {np.ptp(found):.0f} nm" for name, found in before.items())
-        + f"; true position - target: max {np.abs(errors).max():.1f} nm, "
+        + f"; target - true position: max {np.abs(errors).max():.1f} nm, "
         f"rms {np.sqrt((errors**2).mean()):.1f} nm, mean {errors.mean():+.1f} nm; "
         f"{stage.bus.transport.now():.0f} s simulated"
     )
@@ -154,7 +154,7 @@ def s0_fine_bad_nm_rms(
         np.array([getattr(move, name) for move in moves]) for name in ("error_nm", "time_s")
     )
     console.print(
-        f"true position - target: max {np.abs(errors).max():.2f} nm, mean {errors.mean():+.2f} nm; "
+        f"target - true position: max {np.abs(errors).max():.2f} nm, mean {errors.mean():+.2f} nm; "
         f"a move takes {np.median(times):.2f} s (median), {times.max():.2f} s at most; "
         f"{stage.bus.transport.now():.0f} s simulated"
     )
@@ -177,7 +177,7 @@ FIGURES = {
         "um",
         "S0 with the bad value of every effect of stage.toml (scale, guides, temperature, drift, "
         "floor VC-C, motor, converters), the scale measured every 0.5 mm: largest "
-        "|true position - target| of 100 random moves (0.1 um to 2 mm, within 20 mm), motor only",
+        "|target - true position| of 100 random moves (0.1 um to 2 mm, within 20 mm), motor only",
         "<= 0.3",
         Quick(
             {"count": 2, "segments": 3, "axes": 1},
@@ -189,7 +189,7 @@ FIGURES = {
         s0_fine_bad_nm_rms,
         "nm",
         "S0 with the bad value of every effect of stage.toml, its scale measured every 0.5 mm and "
-        "its calibration following: rms of true position - target of 100 random moves (0.1 um to "
+        "its calibration following: rms of target - true position of 100 random moves (0.1 um to "
         "2 mm, within 20 mm), motor and piezo, from a zero that was measured in the same way; the "
         "signals drift within 10 minutes, the temperature with a time constant of half an hour",
         "<= 10",

@@ -4,6 +4,7 @@ beside theirs (peers.toml).
 """
 
 import math
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,6 +37,19 @@ class Comparison:
     better: str  # less, more
     peers: Sequence[Peer] = ()
     limit: tuple[float, str] | None = None  # value, what sets it
+
+
+SIGNS = {"<=": "≤", ">=": "≥", "+-": "±", "um": "µm", "us": "µs", " arcsec": "″", " - ": " − "}
+SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def typeset(text: str) -> str:
+    """With the signs and powers that readers of a page expect instead of those of a terminal."""
+    for plain, sign in SIGNS.items():
+        at_word = r"(?![a-z])" if plain[-1].isalpha() else ""
+        before = r"(?<![a-z])" if plain[0].isalpha() else ""
+        text = re.sub(before + re.escape(plain) + at_word, sign, text)
+    return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(SUPERSCRIPTS), text)
 
 
 def comparisons(path: Path = PEERS) -> dict[str, Comparison]:
@@ -101,17 +115,18 @@ def bars(figure: Figure, value: float, comparison: Comparison) -> tuple[Markup, 
         bars=drawn,
         limit=broken,
     )
-    note = f"{figure.what}; {comparison.better} is better{', logarithmic' if logarithmic else ''}"
+    kind = ", logarithmic" if logarithmic else ""
+    note = f"{typeset(figure.what)}; {comparison.better} is better{kind}"
     return svg, note
 
 
 def row(result: Result) -> dict[str, str]:
     name, figure, value, took = result
-    made = {"name": name, "what": figure.what, "bound": figure.bound_words}
+    made = {"name": name, "what": typeset(figure.what), "bound": typeset(figure.bound_words)}
     if value is None:
         return {**made, "value": f"failed: {took}", "kind": "bad", "took": ""}
     kind = "good" if figure.good(value) else "bad"
-    measured = f"{value:.{figure.digits}f} {figure.unit}"
+    measured = typeset(f"{value:.{figure.digits}f} {figure.unit}")
     return {**made, "value": measured, "kind": kind, "took": f"{took:.0f} s"}
 
 

@@ -22,15 +22,15 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from multiprocessing import get_context
 
+from experiments import start_page
 from figures import record
 from figures.common import Absent, Figure, collected, console, modules
 from figures.comparison import page
 from figures.synthesis import SynthesisError
 from moire.errors import MoireError
 from twin import BuildError
-from twin.build import ROOT, SHORT_RUNS
+from twin.build import SHORT_RUNS
 
-PAGE = ROOT / "build" / "report" / "figures.html"
 PROCESSES = 2
 LONG = (
     "s4",
@@ -138,9 +138,8 @@ def conclude(outcomes: Sequence[Outcome], names: Sequence[str], recorded: bool) 
             (done.name, figures[done.name], done.value, done.error or done.took)
             for done in outcomes
         ]
-        PAGE.parent.mkdir(parents=True, exist_ok=True)
-        PAGE.write_text(page(results), encoding="utf-8")
-        console.print(f"page: {PAGE}", soft_wrap=True)
+        written = start_page.publish("figures", page(results))
+        console.print(f"page: {written}", soft_wrap=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -38,7 +38,7 @@ def prepared_stage(seed: int) -> FineStage:
 
 @cache
 def errors_nm(count: int, seed: int) -> NDArray[np.float64]:
-    """True position - target at the time when the node reports that it has arrived."""
+    """Target - true position at the time when the node reports that it has arrived."""
     stage = prepared_stage(seed)
     with bar("moves") as progress:
         task = progress.add_task("", total=count)
@@ -47,7 +47,7 @@ def errors_nm(count: int, seed: int) -> NDArray[np.float64]:
         np.array([getattr(move, name) for move in moves]) for name in ("error_nm", "time_s")
     )
     console.print(
-        f"true position - target: max {np.abs(errors).max():.2f} nm, "
+        f"target - true position: max {np.abs(errors).max():.2f} nm, "
         f"rms {np.sqrt((errors**2).mean()):.2f} nm, mean {errors.mean():+.2f} nm; "
         f"a move takes {np.median(times):.2f} s (median), {times.max():.2f} s at most"
     )
@@ -126,7 +126,7 @@ FIGURES = {
     "s0_fine_nm_max": Figure(
         s0_fine_nm_max,
         "nm",
-        "largest |true position - target| of 100 random moves (0.1 um to 2 mm), motor and piezo, "
+        "largest |target - true position| of 100 random moves (0.1 um to 2 mm), motor and piezo, "
         "each axis from its own zero; a perfect scale, no vibration, no drift",
         "<= 5",
         FEW,
@@ -146,7 +146,7 @@ FIGURES = {
     "s0_fine_drift_nm_rms": Figure(
         s0_fine_drift_nm_rms,
         "nm",
-        "rms of true position - target of random moves (0.1 um to 2 mm), motor and piezo, while "
+        "rms of target - true position of random moves (0.1 um to 2 mm), motor and piezo, while "
         "+2 % of offset, +2 % of gain and +1 degree of phase drift in within ten minutes and the "
         "calibration follows; half of the phase drift cannot be told from motion",
         "<= 1.5",

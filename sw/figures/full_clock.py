@@ -79,7 +79,7 @@ def show_s0(results: Sequence[S0Result]) -> None:
             row("samples per second", lambda r: f"{r.sample_hz:.0f}"),
             row("zero from a phase zero, nm", lambda r: f"{r.zero_nm:.1f}"),
             row("both homings, s", lambda r: f"{r.homing_s:.3f}"),
-            row("largest |true position - target|, nm", lambda r: f"{r.largest_nm:.1f}"),
+            row("largest |target - true position|, nm", lambda r: f"{r.largest_nm:.1f}"),
             row(
                 "rms, nm",
                 lambda r: f"{math.sqrt(sum(e * e for e in r.errors_nm) / len(r.errors_nm)):.1f}",
@@ -143,7 +143,7 @@ FIGURES = {
     "full_clock_um": Figure(
         full_clock_um,
         "um",
-        f"CLK_HZ = {FULL_CLK_HZ / 1e6:g} MHz, 115200 baud: largest |true position - target| of "
+        f"CLK_HZ = {FULL_CLK_HZ / 1e6:g} MHz, 115200 baud: largest |target - true position| of "
         f"{MOVES} moves of S0 after homing, motor only; no wrong count of three axes of S2 at "
         "500, 500 and 400 mm/s for a second",
         "<= 0.05",

@@ -57,7 +57,7 @@ def s0_coarse_um_max(count: int = 100, seed: int = SEED) -> float:
         np.array([getattr(move, name) for move in moves]) for name in ("error_nm", "time_s")
     )
     console.print(
-        f"true position - target: max {np.abs(errors).max():.1f} nm, "
+        f"target - true position: max {np.abs(errors).max():.1f} nm, "
         f"rms {np.sqrt((errors**2).mean()):.1f} nm, mean {errors.mean():.1f} nm; "
         f"a move takes {np.median(times):.2f} s (median), {times.max():.2f} s at most"
     )
@@ -250,7 +250,7 @@ FIGURES = {
     "s0_coarse_um_max": Figure(
         s0_coarse_um_max,
         "um",
-        "largest |true position - target| of 100 random moves (0.1 um to 2 mm), motor only; a "
+        "largest |target - true position| of 100 random moves (0.1 um to 2 mm), motor only; a "
         "perfect scale, no vibration, no drift",
         "<= 0.05",
         Quick({"count": 3}, "three moves"),

@@ -76,7 +76,7 @@ class Machine:
 
 def run_s0(values: Mapping[str, float], measure: Measure, seed: int, targets: int) -> Measured:
     """Powers up an axis of S0's stage with these parameters, homes it and makes the moves. The
-    error is the true position minus the target, the zero being that of the homing.
+    error is the target minus the true position, the zero being that of the homing.
     """
     plant: dict[str, Any] = dict(values)
     stage = Stage.power_up(seed, [AXIS], node_parameters=WITH_SEGMENTS, **plant)

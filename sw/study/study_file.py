@@ -419,7 +419,7 @@ EXAMPLE = """\
 machine = "{name}"
 
 [spec]                        # a machine is good if it keeps both; one of them is enough
-largest_error = "0.3 um"      # largest |true position - target| of its moves
+largest_error = "0.3 um"      # largest |target - true position| of its moves
 rms_error = "0.15 um"
 
 [measure]                     # what each run does after homing

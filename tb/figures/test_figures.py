@@ -11,8 +11,9 @@ from datetime import date
 import pytest
 
 from boards import build
+from experiments import start_page
+from figures import comparison, record, synthesis, timing
 from figures import figure as command
-from figures import record, synthesis, timing
 from figures.common import Absent, Figure, Quick, collected, seeds, shares, within
 from tables import readme_figures
 
@@ -122,13 +123,16 @@ def test_a_figure_whose_program_is_absent_is_not_measured_and_does_not_fail_all_
     }
     path = tmp_path / "figures.toml"
     monkeypatch.setattr(command, "collected", lambda attribute: figures)
-    monkeypatch.setattr(command, "PAGE", tmp_path / "figures.html")
+    monkeypatch.setattr(start_page.publish, "__defaults__", (tmp_path,))
     monkeypatch.setattr(record.add, "__defaults__", (path,))
     assert command.main(["drawn"]) == 1
     assert "drawn: not measured: Chromium is not installed" in capsys.readouterr().err
     assert command.main(["--all"]) == 0
     assert capsys.readouterr().out == "fixed 2.0 nm\n" and set(record.read(path)) == {"fixed"}
-    assert "make chromium" in command.PAGE.read_text()
+    assert "make chromium" in (tmp_path / "figures.html").read_text()
+    assert (
+        "fixed" not in (start := (tmp_path / "index.html").read_text()) and "figures.html" in start
+    )
     figures["fixed"] = Figure(lambda: 3.0, "nm", "a fixed one", "2", Quick(), 1)
     assert command.main(["--all"]) == 1
 
@@ -151,7 +155,7 @@ def test_the_table_refuses_a_record_of_another_bound():
 
 def test_signs_and_powers_are_typeset():
     text = "10^5 moves <= 3 um, +-2 arcsec, sum of 20 us"
-    assert readme_figures.typeset(text) == "10⁵ moves ≤ 3 µm, ±2″, sum of 20 µs"
+    assert comparison.typeset(text) == "10⁵ moves ≤ 3 µm, ±2″, sum of 20 µs"
 
 
 def test_lut4s_count_carry_cells_twice_and_lut_ram_six_times(tmp_path):

@@ -67,3 +67,10 @@ def test_our_fit_leaves_less_than_the_papers():
         for way in (s1_ring.as_in_the_paper, s1_ring.ours)
     )
     assert better < plain < s1_ring.PAPER_AFTER
+
+
+@pytest.mark.parametrize("places", [8, 40])
+def test_the_harmonics_of_few_angles_are_drawn_too(places):
+    angles = s1_ring.off_grid(np.random.default_rng(1), places)
+    before = 100 * np.sin(np.radians(angles))
+    assert s1_ring.bars(angles, before, []).startswith(b"\x89PNG")

@@ -7,11 +7,10 @@ import importlib.metadata
 import io
 import json
 import os
-import select
+import re
 import subprocess
 import sys
 import threading
-import time
 
 import pytest
 
@@ -769,6 +768,26 @@ def test_bash_completes_the_last_command_of_a_chain(typed, offered):
     assert set(completion.candidates(typed.removeprefix("moire "))) == offered
 
 
+@pytest.mark.parametrize(
+    "shell_name, words, offered",
+    [
+        ("zsh", {"COMP_WORDS": "moire home -- stat", "COMP_CWORD": "3"}, "status"),
+        ("fish", {"COMP_WORDS": "moire home -- stat", "COMP_CWORD": "stat"}, "status"),
+    ],
+)
+def test_zsh_and_fish_complete_the_last_command_too(shell_name, words, offered):
+    def ask(what):
+        return subprocess.run(
+            [sys.executable, "-m", "moire"],
+            env={**os.environ, **words, "_MOIRE_COMPLETE": f"{shell_name}_{what}"},
+            capture_output=True,
+            text=True,
+        ).stdout
+
+    assert offered in re.split(r"[\s,]", ask("complete"))
+    assert f"_MOIRE_COMPLETE={shell_name}_complete" in ask("source")
+
+
 # ------------------------------------------------------------------ files and the shell
 
 
@@ -858,61 +877,6 @@ def test_the_shell_has_help(monkeypatch, capsys):
     assert Call("shell").code == 0
     message = capsys.readouterr().out
     assert "Usage: moire move" in message and "Usage: moire [OPTIONS] COMMAND" in message
-
-
-SHELL_AT_A_TERMINAL = """
-import sys
-from moire.cli import command_line
-from tb.fakes.bus_node import BusNode
-from tb.fakes.rs485_bus import Rs485Bus
-sys.exit(command_line.main(["shell"], lambda _: Rs485Bus(BusNode())))
-"""
-
-
-def test_a_terminal_has_line_editing_completion_and_history(tmp_path):
-    pty = pytest.importorskip("pty")
-    pytest.importorskip("readline")
-    person, terminal = pty.openpty()
-    program = subprocess.Popen(
-        [sys.executable, "-c", SHELL_AT_A_TERMINAL],
-        stdin=terminal,
-        stdout=terminal,
-        stderr=terminal,
-        env={**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)},
-    )
-    os.close(terminal)
-    seen = b""
-
-    def until(text):
-        nonlocal seen
-        end = time.monotonic() + 60
-        while text not in seen and time.monotonic() < end:
-            if select.select([person], [], [], 0.1)[0]:
-                seen += os.read(person, 4096)
-        assert text in seen
-        seen = seen.partition(text)[2]
-
-    try:
-        until(b"moire> ")
-        os.write(person, b"sta\bat\t")  # a typing error taken back, then the Tab key
-        until(b"atus ")
-        os.write(person, b"\n")
-        until(b"drive off")
-        until(b"moire> ")
-        os.write(person, b"\x1b[A --json\n")  # the line before, and more
-        until(b'"command": "status"')
-        until(b"moire> ")
-        os.write(person, b"quit\n")
-        assert program.wait(60) == 0
-    finally:
-        program.kill()
-        os.close(person)
-    (history,) = tmp_path.rglob("history")
-    assert [line.split() for line in history.read_text().splitlines()][-3:] == [
-        ["status"],
-        ["status", "--json"],
-        ["quit"],
-    ]
 
 
 def test_a_shell_ends_when_its_node_no_longer_answers(monkeypatch):

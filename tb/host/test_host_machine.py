@@ -13,6 +13,7 @@ from moire import aio, description
 from moire import machine as machine_module
 from moire.bus.twin_port import AXES, MACHINES
 from moire.client import axis as blocking_axis
+from moire.client import node as blocking_node
 from moire.client import remedies
 from moire.errors import BadFile, BusError, MotionFailed, PortError, Refused, UnknownName
 from moire.made import bus_tables
@@ -20,6 +21,7 @@ from tables import faults
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
+from twin.compiled.node import FAULT, PERIOD
 
 TEXT = """\
 text = "a test machine"
@@ -263,6 +265,19 @@ def test_a_fault_is_explained_without_a_port():
     assert "did you mean following_error?" in sentence(Call("fault folowing_error"), 2)
 
 
+LATCHED = ("estop", "drive", "cpu")  # also while the drive is off
+
+
+@pytest.mark.parametrize("fault", LATCHED)
+def test_a_latched_fault_comes_with_what_to_do_about_that_fault(fault):
+    node = BusNode()
+    node.axes[0].causes = FAULT[fault]
+    node.run(1)
+    shown = Call("fault", node).out
+    assert remedies.of_faults((fault,)) in shown and "then 'moire reset'" in shown
+    assert sum(remedies.of_faults((other,)) in shown for other in LATCHED) == 1
+
+
 def test_every_fault_cause_and_reason_says_what_to_do():
     for what, (found, words) in remedies.TABLES.items():
         names = {name for name, _ in words.values()} - set(remedies.HARMLESS)
@@ -451,3 +466,31 @@ def test_the_asynchronous_axis_has_the_methods_of_the_blocking_one():
     }
     assert mine - own <= public and public - mine == inner & public
     assert aio.Axis.move.__doc__ == blocking_axis.Axis.move.__doc__
+
+
+def public(kind):
+    """The names of the methods of a class that users call."""
+    members = inspect.getmembers(kind, inspect.isfunction)
+    return {name for name, _ in members if not name.startswith("_")}
+
+
+def test_the_asynchronous_machine_and_node_have_the_methods_of_the_blocking_ones():
+    assert public(aio.Machine) == public(machine_module.Machine)
+    assert public(aio.Node) == public(blocking_node.Node)
+    assert aio.Node.start.__doc__ == blocking_node.Node.start.__doc__
+
+
+def test_prepared_axes_of_a_node_begin_together_in_a_task(monkeypatch):
+    async def work(machine, bus):
+        node = await machine.node(2)
+        axes = [await node.axis(number) for number in range(node.identity.axes)]
+        for axis in axes:
+            await axis.enable()
+            await axis.home(method="37")
+            await axis.prepare("1 mm")
+        ended = await node.start(0, 1)
+        assert [status.position_nm for status in ended] == [1_000_000] * 2
+        assert (await node.counters())["frames_good"] > 0 and node.address == 2
+        assert (await node.request("status", axis=1))["position"] == 1250 * PERIOD
+
+    asynchronous(work, monkeypatch, BusNode(2, axes=2))

@@ -12,11 +12,14 @@ from pathlib import Path
 
 import click
 import cobs
+import prompt_toolkit
 import pytest
 import serial
+import wcwidth
 
 HOST = Path(__file__).resolve().parents[2] / "sw" / "host"
-DEPENDENCIES = (click, cobs, serial)  # NumPy and Matplotlib are loaded only where they are needed
+# NumPy and Matplotlib are loaded only where they are needed
+DEPENDENCIES = (click, cobs, prompt_toolkit, serial, wcwidth)
 
 
 def run(*command, **settings):

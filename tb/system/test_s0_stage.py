@@ -122,6 +122,7 @@ def test_five_moves_reach_their_targets(stage):
     ):
         move = stage.move(name, target_nm)
         assert abs(move.error_nm) <= BOUND_NM, move
+        assert move.error_nm == move.target_nm - move.true_nm, "the sign of every error"
         assert abs(move.reached_nm - target_nm) <= BOUND_NM, move
 
 

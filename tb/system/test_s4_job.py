@@ -3,10 +3,12 @@
 form of the figure s4_jobs_failed has a job with disturbances and a power cut of both nodes.
 """
 
+import io
 import math
 import random
 
 import pytest
+from rich.console import Console
 
 from experiments.s4_job import (
     SUB,
@@ -15,6 +17,7 @@ from experiments.s4_job import (
     Outcome,
     apart,
     random_stations,
+    shown_by,
 )
 from moire.client.job import JobState
 from tb.bench import seed
@@ -71,6 +74,16 @@ def test_a_job_fails_beyond_the_tolerance_or_without_an_end():
 
 def test_the_difference_of_two_angles_is_the_shorter_one():
     assert apart(1, 1296000 - 1) == 2 and apart(1296000 - 1, 1) == -2 and apart(3600, 3599.5) == 0.5
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_job_shows_its_progress_also_where_there_is_no_terminal(terminal):
+    out = io.StringIO()
+    console = Console(file=out, force_terminal=terminal)
+    status = console.status("building the twin")
+    shown_by(console, status)("station 2 of 36")
+    assert (out.getvalue() == "station 2 of 36\n") is not terminal
+    assert ("station 2" in str(status.status)) is terminal
 
 
 def test_random_stations_ascend_within_a_turn():

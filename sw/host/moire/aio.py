@@ -20,15 +20,15 @@ from collections.abc import AsyncIterator, Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from types import TracebackType
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Protocol, Self, TypeVar
 
 from moire import machine as blocking
 from moire import units
 from moire.bus.protocol import Reply
 from moire.bus.transport import BAUD, Transport
 from moire.client import axis as blocking_axis
+from moire.client import node as blocking_node
 from moire.client.bus import ANSWER_S, TRIES, Bus
-from moire.client.node import Node
 from moire.client.records import Identity, Sample
 from moire.description import Description
 from moire.errors import MoireError
@@ -64,7 +64,7 @@ class SharedBus(Bus):
         with self.lock:
             return super().exchange(address, operation, tries=tries, answer_s=answer_s, **fields)
 
-    def until_next_poll(self, polled: Node, seconds: float | None = None) -> None:
+    def until_next_poll(self, polled: blocking_node.Node, seconds: float | None = None) -> None:
         """Raises Cancelled, once, where the task has been cancelled."""
         cancelled: threading.Event | None = getattr(self.here, "cancelled", None)
         if cancelled is not None and cancelled.is_set():
@@ -107,12 +107,19 @@ class Caller:
             raise
 
 
-def awaited(
-    method: Callable[Concatenate[blocking_axis.Axis, P], Result],
-) -> Callable[Concatenate["Axis", P], Coroutine[Any, Any, Result]]:
-    """The method of a blocking axis as a coroutine of an Axis, with the same arguments."""
+class Called(Protocol):
+    """An object of this module, and the blocking one whose methods it has."""
 
-    async def call(self: "Axis", /, *arguments: P.args, **named: P.kwargs) -> Result:
+    caller: Caller
+    blocking: Any
+
+
+def awaited(
+    method: Callable[Concatenate[Any, P], Result],
+) -> Callable[Concatenate[Called, P], Coroutine[Any, Any, Result]]:
+    """The method of a blocking object as a coroutine, with the same arguments."""
+
+    async def call(self: Called, /, *arguments: P.args, **named: P.kwargs) -> Result:
         return await self.caller.call(lambda: method(self.blocking, *arguments, **named))
 
     call.__name__, call.__doc__ = method.__name__, method.__doc__
@@ -188,6 +195,33 @@ class Axis:
             yield sample
 
 
+class Node:
+    """One node; see moire.client.node.Node, whose methods these are."""
+
+    def __init__(self, caller: Caller, node: blocking_node.Node):
+        self.caller, self.blocking = caller, node
+        self.address, self.identity = node.address, node.identity
+
+    start = awaited(blocking_node.Node.start)
+    counters = awaited(blocking_node.Node.counters)
+    update = awaited(blocking_node.Node.update)
+    read_register = awaited(blocking_node.Node.read_register)
+    write_register = awaited(blocking_node.Node.write_register)
+    read_named = awaited(blocking_node.Node.read_named)
+
+    async def request(self, operation: str, **fields: int) -> dict[str, int]:
+        """Sends one request; see Bus.request()."""
+        return await self.caller.call(lambda: self.blocking.request(operation, **fields))
+
+    async def write_named(self, name: str, axis: int = 0, **counts: int) -> None:
+        """Writes fields of a register by their names; see the blocking node."""
+        await self.caller.call(lambda: self.blocking.write_named(name, axis, **counts))
+
+    async def axis(self, number: int = 0) -> Axis:
+        """An axis of this node; raises Refused if there is none of this number."""
+        return Axis(self.caller, await self.caller.call(lambda: self.blocking.axis(number)))
+
+
 class Machine:
     """All axes of one bus; see moire.machine.Machine."""
 
@@ -203,6 +237,10 @@ class Machine:
         """The named axes, in the order of the description."""
         found = await self.caller.call(self.blocking.axes)
         return {name: Axis(self.caller, axis) for name, axis in found.items()}
+
+    async def node(self, address: int = 1) -> Node:
+        """A node by its address; see Bus.node()."""
+        return Node(self.caller, await self.caller.call(lambda: self.blocking.node(address)))
 
     async def find(self) -> list[Identity]:
         """The nodes that answer; see Bus.find()."""

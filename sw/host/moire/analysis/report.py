@@ -2,9 +2,9 @@
 """One page with the results of an experiment: moves, pictures, and the numbers of the paper.
 
     result = report.Result(title="S0", moves=moves, traces=traces, compared=[...], seed=1)
-    report.write(result, "build/report")
+    report.write(result, "build/report/s0_stage.html")
 
-The page is one file: the pictures are inside it. Errors are true position minus target, in nm.
+The page is one file: the pictures are inside it. An error is target minus true position, in nm.
 """
 
 import base64
@@ -38,7 +38,7 @@ class Move:
     target_nm: float
     reached_nm: float  # by the encoder
     true_nm: float
-    error_nm: float  # true - target
+    error_nm: float  # target - true
     time_s: float
 
 
@@ -69,7 +69,8 @@ AGAINST_THE_PAPER = ("", "the paper: a real machine", "here: its model in the tw
 @dataclass(frozen=True)
 class Compared:
     """A number of the paper, measured on a real machine, and ours, from the twin. `reached` is
-    whether ours is at least as good, None where the two are not comparable.
+    whether ours is at least as good; None where the paper has no number, or where the two are not
+    the same quantity.
     """
 
     what: str
@@ -90,6 +91,8 @@ class Result:
     seed: int | None = None
     facts: dict[str, str] = field(default_factory=dict)  # what else a reader should know
     summary: str = ""
+    claim: str = ""  # the result in one sentence
+    left_out: str = ""  # what the model of the machine leaves out
     paper_error_nm: float = PAPER_ERROR_NM
     # more pictures, of this experiment only: name -> (caption, PNG)
     drawn: dict[str, tuple[str, bytes]] = field(default_factory=dict)
@@ -282,7 +285,7 @@ def histogram(moves: Sequence[Move], paper_error_nm: float) -> bytes:
             label=names,
             color=[colour(number) for number in range(len(names))],
         )
-        panel.set_xlabel(f"true position \N{MINUS SIGN} target / {unit}")
+        panel.set_xlabel(f"error (target \N{MINUS SIGN} true position) / {unit}")
         panel.set_ylabel("moves")
         if paper_error_nm <= reach:
             for side in (-1, 1):
@@ -349,9 +352,13 @@ th, td {
   padding: .4rem .8rem; text-align: right; border-bottom: 1px solid #e8edf2;
   white-space: nowrap;
 }
-th { background: #eef2f6; position: sticky; top: 0; font-weight: 600; }
+th {
+  background: #eef2f6; position: sticky; top: 0; font-weight: 600; white-space: normal;
+  vertical-align: bottom;
+}
 th.text, td.text { text-align: left; white-space: normal; }
 tbody tr:last-child td { border-bottom: 0; }
+p.left-out { color: #48586a; font-size: .92rem; margin: .5rem 0 0; max-width: 46rem; }
 .good { color: #1d6b3a; font-weight: 600; }
 .bad { color: #a3161f; font-weight: 600; }
 .numbers {
@@ -367,7 +374,8 @@ tbody tr:last-child td { border-bottom: 0; }
 
 
 def cell(text: object, tag: str = "td", kind: str = "") -> str:
-    """One cell of a table; `kind` is its class."""
+    """One cell of a table; `kind` is its class. A unit stays on the line of its slash."""
+    text = str(text).replace(" / ", " /\N{NO-BREAK SPACE}") if tag == "th" else text
     attribute = f' class="{kind}"' if kind else ""
     return f"<{tag}{attribute}>{html.escape(str(text))}</{tag}>"
 
@@ -401,8 +409,27 @@ def table(
 def verdict(reached: bool | None) -> tuple[str, str]:
     """The text and the class of a comparison."""
     if reached is None:
-        return ("", "")
+        return ("not compared", "")
     return ("reached", "good") if reached else ("not reached", "bad")
+
+
+def against_the_paper(compared: Sequence[Compared], left_out: str) -> str:
+    """The numbers of a paper and ours, and beside them what the model leaves out."""
+    rows: list[Sequence[Cell]] = [
+        (entry.what, entry.paper, entry.ours, verdict(entry.reached)) for entry in compared
+    ]
+    note = f'<p class="left-out">The model leaves out: {html.escape(left_out)}.</p>'
+    return (
+        "<h2>Against the paper</h2>" + table(AGAINST_THE_PAPER, rows) + (note if left_out else "")
+    )
+
+
+def meta(claim: str, left_out: str) -> str:
+    """What a start page reads from the head of a page."""
+    contents = {"description": claim, "left-out": left_out}
+    return "\n".join(
+        f'<meta name="{name}" content="{html.escape(text)}">' for name, text in contents.items()
+    )
 
 
 def move_rows(result: Result) -> Iterator[Sequence[Cell]]:
@@ -442,11 +469,7 @@ def page(result: Result) -> str:
     if result.summary:
         parts.insert(1, f'<p class="summary">{html.escape(result.summary)}</p>')
     if result.compared:
-        rows: list[Sequence[Cell]] = [
-            (entry.what, entry.paper, entry.ours, verdict(entry.reached))
-            for entry in result.compared
-        ]
-        parts += ["<h2>Against the paper</h2>", table(AGAINST_THE_PAPER, rows)]
+        parts.append(against_the_paper(result.compared, result.left_out))
     parts.append("<h2>Pictures</h2>")
     for name, (caption, image) in pictures(result).items():
         source = "data:image/png;base64," + base64.b64encode(image).decode()
@@ -467,6 +490,7 @@ def page(result: Result) -> str:
             "<!DOCTYPE html>",
             '<html lang="en"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            meta(result.claim, result.left_out),
             f"<title>{title}</title>",
             f"<style>\n{STYLE}</style></head>",
             "<body><main>",
@@ -477,9 +501,9 @@ def page(result: Result) -> str:
     )
 
 
-def write(result: Result, folder: str | Path = "build/report") -> Path:
-    """Writes index.html in the folder and returns its path; raises BadFile."""
-    return write_text(Path(folder) / "index.html", page(result))
+def write(result: Result, path: str | Path) -> Path:
+    """Writes the page and returns its path; raises BadFile."""
+    return write_text(Path(path), page(result))
 
 
 def write_text(path: Path, text: str) -> Path:

@@ -57,9 +57,11 @@ def answer_shell() -> None:
         moire.main([], prog_name="moire", complete_var=VARIABLE)
 
 
-def candidates(line: str) -> list[str]:
-    """The words that may follow in a line of `moire shell`, the last of which is incomplete."""
+def candidates(line: str) -> dict[str, str]:
+    """The words that may follow in a line of `moire shell`, the last of which is incomplete, and
+    what they mean.
+    """
     *words, incomplete = line.split(" ")
     arguments = last_command([word for word in words if word])
     found = ShellComplete(moire, {}, "moire", VARIABLE).get_completions(arguments, incomplete)
-    return [item.value for item in found if item.type == "plain"]
+    return {item.value: item.help or "" for item in found if item.type == "plain"}

@@ -5,53 +5,44 @@ pipe.
 
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import ModuleType
+from collections.abc import Callable
 
-from moire.cli.completion import candidates
 from moire.cli.parser import parse_line
 from moire.cli.session import Call, Session
 from moire.cli.signals import Ended
 from moire.description import settings_folder
 from moire.errors import MoireError
 
-readline: ModuleType | None
-try:
-    import readline
-except ImportError:  # Windows
-    readline = None
-
 KEEP_ALIVE_S = 0.1
-LONGEST_HISTORY = 1000
+HISTORY = "shell_history"  # the file in the folder of settings
 PROMPT = "moire> "
 LEAVE = ("quit", "exit")
 
 
 def run_shell(call: Call) -> None:
     """Carry out lines until 'quit' or the end of the input."""
-    session, person, lines = call.session, sys.stdin.isatty(), iter(sys.stdin)
+    session, person = call.session, sys.stdin.isatty()
     alive = KeptAlive(session)  # opens the port, so that a wrong one is reported now
-    with history():
-        while True:
-            try:
-                with alive:
-                    text = next_line(session, lines, person)
-                if text is None or text.strip() in LEAVE:
-                    return
-                for planned in parse_line(help_line(text), call.options, session.description):
-                    session.carry_out(planned)
-            except MoireError as error:
-                if not person or alive.failed:
-                    raise
-                session.complain(error)
-            except KeyboardInterrupt as interrupt:
-                if not person or isinstance(interrupt, Ended):
-                    raise
-                session.stop_axes()
-                print("\nstopped", file=session.err)
-            except SystemExit:
-                pass  # --help
+    next_line = typed_lines() if at_terminal() else plain_lines(session, person)
+    while True:
+        try:
+            with alive:
+                text = next_line()
+            if text is None or text.strip() in LEAVE:
+                return
+            for planned in parse_line(help_line(text), call.options, session.description):
+                session.carry_out(planned)
+        except MoireError as error:
+            if not person or alive.failed:
+                raise
+            session.complain(error)
+        except KeyboardInterrupt as interrupt:
+            if not person or isinstance(interrupt, Ended):
+                raise
+            session.stop_axes()
+            print("\nstopped", file=session.err)
+        except SystemExit:
+            pass  # --help
 
 
 def at_terminal() -> bool:
@@ -65,17 +56,24 @@ def help_line(text: str) -> str:
     return " ".join([*words[1:], "--help"]) if words[:1] == ["help"] else text
 
 
-def next_line(session: Session, lines: Iterator[str], person: bool) -> str | None:
-    """The next line; None at the end of the input."""
-    if at_terminal():
-        try:
-            return input(PROMPT)
-        except EOFError:
-            print(file=session.err)
-            return None
-    if person:
-        print(PROMPT, end="", file=session.err, flush=True)
-    return next(lines, None)
+def typed_lines() -> Callable[[], str | None]:
+    """What returns the next line that a person types at a terminal."""
+    from moire.cli.terminal import Terminal  # takes a third of a second
+
+    terminal = Terminal(settings_folder() / HISTORY)
+    return lambda: terminal.line(PROMPT)
+
+
+def plain_lines(session: Session, person: bool) -> Callable[[], str | None]:
+    """What returns the next line of the standard input, without editing; None at its end."""
+    lines = iter(sys.stdin)
+
+    def next_line() -> str | None:
+        if person:
+            print(PROMPT, end="", file=session.err, flush=True)
+        return next(lines, None)
+
+    return next_line
 
 
 class KeptAlive:
@@ -110,37 +108,3 @@ class KeptAlive:
             except MoireError as error:
                 self.error = error
                 return
-
-
-@contextmanager
-def history() -> Iterator[None]:
-    """Lines of earlier shells, and completion by the Tab key, where readline is there."""
-    if readline is None or not at_terminal():
-        yield
-        return
-    file = settings_folder() / "history"
-    try:
-        readline.read_history_file(file)
-    except OSError:
-        pass  # the first time
-    readline.set_history_length(LONGEST_HISTORY)
-    readline.set_completer_delims(" ")
-    readline.set_completer(complete)
-    readline.parse_and_bind("tab: complete")
-    try:
-        yield
-    finally:
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            readline.write_history_file(file)
-        except OSError:
-            pass  # a shell without history is better than none
-
-
-def complete(_: str, number: int) -> str | None:
-    """The candidates for the word before the cursor, one by one, as readline asks for them."""
-    assert readline is not None
-    found = candidates(readline.get_line_buffer()[: readline.get_endidx()])
-    if len(found) == 1:
-        found = [f"{found[0]} "]
-    return found[number] if number < len(found) else None
