@@ -55,6 +55,7 @@ module actuator #(
     output logic              dac_sdi,         // pin, data of the DAC
     // state
     output logic              downward,        // level: the next step goes down
+    output logic signed [15:0] fine_command,   // of the fine stage, full scale 2^15
     output logic              fine_saturated,  // level: the fine stage is at its limit
     output logic              step_overrun     // level: too many steps are overdue
 );
@@ -84,7 +85,6 @@ module actuator #(
     wire [23:0] fine_kp, fine_ki, fine_kd;
     wire [14:0] fine_limit;
     wire fine_kp_written, fine_valid;
-    wire signed [15:0] fine_command;
 
     drive_select u_select (
         // permission
