@@ -176,7 +176,7 @@ module axis #(
     // measuring path
     wire signed [W-1:0] sin, cos;
     wire [15:0] amplitude;
-    wire [5:0] encoder_events;
+    wire [ 5:0] encoder_events;
     wire sample_rejected, pulse_rejected, encoder_fault, position_valid, zero_up, zero_down;
     // target and command
     wire signed [47:0] target;

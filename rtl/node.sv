@@ -176,11 +176,11 @@ module node #(
     wire [ 1:0] scope_phase;
     wire [16:0] scope_available;
     wire [16*AXES-1:0] phases, fine_commands;
-    wire [13*AXES-1:0] axis_faults;
-    wire        [12:0] excitation_period;
-    wire        [14:0] excitation_limit;
-    wire signed [15:0] excitation_value;
-    wire        [11:0] excitation_at;
+    wire        [13*AXES-1:0] axis_faults;
+    wire        [       12:0] excitation_period;
+    wire        [       14:0] excitation_limit;
+    wire signed [       15:0] excitation_value;
+    wire        [       11:0] excitation_at;
     // lines of motor steps
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;

@@ -83,17 +83,17 @@ module tick_recorder #(
     logic hit, known, was_above;  // this sample triggers; the signal was seen, above the level
 
     // the words of a sample
-    wire active = phase == WAITING || phase == RECORDING;
-    wire over = delaying ? left <= 16'd1 && ready : !begun || passed + 1'b1 >= every;
-    wire due = active && tick && over;
-    wire given = valid && sampling && result_axis == axis && kind != '0 && kind <= COMMAND;
-    wire taken = sampling && !given && take != TAKEN;
-    wire [3:0] number = given ? 4'(kind) : take == '0 ? 4'd0 : 4'(COMMAND) + 4'(take);
-    wire [9:0] chosen = 10'd1 << number;
-    wire [A-1:0] place = base + A'(ones(signals & (chosen - 1'b1)));
-    wire keep = !due && (given || taken) && |(signals & chosen);
+    wire          active = phase == WAITING || phase == RECORDING;
+    wire          over = delaying ? left <= 16'd1 && ready : !begun || passed + 1'b1 >= every;
+    wire          due = active && tick && over;
+    wire          given = valid && sampling && result_axis == axis && kind != '0 && kind <= COMMAND;
+    wire          taken = sampling && !given && take != TAKEN;
+    wire  [  3:0] number = given ? 4'(kind) : take == '0 ? 4'd0 : 4'(COMMAND) + 4'(take);
+    wire  [  9:0] chosen = 10'd1 << number;
+    wire  [A-1:0] place = base + A'(ones(signals & (chosen - 1'b1)));
+    wire          keep = !due && (given || taken) && |(signals & chosen);
 
-    logic [31:0] value;
+    logic [ 31:0] value;
     always_comb begin
         case (take)
             3'd0: value = sine_cosine;
@@ -106,9 +106,9 @@ module tick_recorder #(
     end
 
     // the trigger
-    wire looks = !due && (given || taken) && number == trigger_signal;
-    wire above = $signed(value) >= $signed(level);
-    wire below = $signed(value) <= -$signed(level);
+    wire  looks = !due && (given || taken) && number == trigger_signal;
+    wire  above = $signed(value) >= $signed(level);
+    wire  below = $signed(value) <= -$signed(level);
     logic hits;
     always_comb begin
         case (trigger_mode)
@@ -119,17 +119,17 @@ module tick_recorder #(
             default: hits = 1'b0;
         endcase
     end
-    wire seen = trigger_mode == ALWAYS || hit || looks && hits;
+    wire        seen = trigger_mode == ALWAYS || hit || looks && hits;
 
     // the end of a sample
     wire [16:0] each = 17'(ones(signals));
-    wire ends = given && kind == COMMAND && !due;
-    wire fits = used + each + each <= 17'(WORDS);  // this sample and one more
-    wire ripe = kept == earlier || !fits;
-    wire counts = phase == RECORDING || delaying || seen && ripe && delay == '0;
-    wire drops = ends && !counts && ripe;  // the oldest sample
-    wire last = !fits || length != '0 && kept + 1'b1 >= length;
-    wire passes = read && available != '0;
+    wire        ends = given && kind == COMMAND && !due;
+    wire        fits = used + each + each <= 17'(WORDS);  // this sample and one more
+    wire        ripe = kept == earlier || !fits;
+    wire        counts = phase == RECORDING || delaying || seen && ripe && delay == '0;
+    wire        drops = ends && !counts && ripe;  // the oldest sample
+    wire        last = !fits || length != '0 && kept + 1'b1 >= length;
+    wire        passes = read && available != '0;
 
     assign available = phase == FULL || phase == RECORDING && length == '0 ? used : '0;
     assign triggered = phase == RECORDING || delaying;
@@ -182,8 +182,8 @@ module tick_recorder #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
-    wire [A-1:0] distance = place - at;
+    logic         past = 1'b0;
+    wire  [A-1:0] distance = place - at;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -192,8 +192,10 @@ module tick_recorder #(
             assert (!keep || active);
             assert (!active || base == A'(at + used[A-1:0]));
             assert (used <= 17'(WORDS) && available <= used);
-            assert (!keep || 17'(distance) >= used);
-            assert (!triggered || phase != FULL && phase != EMPTY);
+            assert (start || !keep || 17'(distance) >= used);
+            assert (!sampling || active);
+            assert (!delaying || phase == WAITING);
+            assert (start || !active || used + each <= 17'(WORDS));
         end
         cover (past && phase == FULL && word == 32'h1234_5678);
     end

@@ -94,9 +94,7 @@ class TickRecorder:
         fits = self.used + 2 * each <= self.words
         ripe = self.kept == i["earlier"] or not fits
         ends = given and i["kind"] == COMMAND and not due
-        counts = (
-            self.phase == RECORDING or self.delaying or seen and ripe and i["delay"] == 0
-        )
+        counts = self.phase == RECORDING or self.delaying or seen and ripe and i["delay"] == 0
         last = not fits or i["length"] and (self.kept + 1) % 65536 >= i["length"]
         if active and i["tick"]:
             self.passed = 0 if due else (self.passed + 1) % 65536

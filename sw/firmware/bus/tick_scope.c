@@ -8,9 +8,9 @@
 #include "core/hardware.h"
 #include "made/bus_protocol.h"
 
-#define WORDS 14u    // of a reply
-#define VALUES 24u   // of a request
-#define SETTINGS 16u // bytes of a request to record, which are those of four registers
+#define WORDS 14u     // of a reply
+#define VALUES 24u    // of a request
+#define SETTINGS 16u  // bytes of a request to record, which are those of four registers
 
 static struct {
     uint16_t read;  // words of the recording

@@ -165,13 +165,14 @@ class Trigger:
 
     def counts(self, period_nm: Fraction, tick_hz: int) -> int:
         """The level in LSB of the signal; raises UnitError or OutOfRange."""
-        if self.signal not in SIGNALS or self.kind not in TRIGGERS:
-            wrong, known = (
-                (f"signal '{self.signal}' to trigger", SIGNALS)
-                if self.signal not in SIGNALS
-                else (f"trigger '{self.kind}'", TRIGGERS)
+        if self.kind not in TRIGGERS:
+            raise OutOfRange(
+                f"there is no trigger '{self.kind}': there are {', '.join(TRIGGERS)}"
             )
-            raise OutOfRange(f"there is no {wrong}: there are {', '.join(known)}")
+        if self.signal not in SIGNALS:
+            raise OutOfRange(
+                f"there is no signal '{self.signal}' to trigger: there are {', '.join(SIGNALS)}"
+            )
         lsb_nm = period_nm / COUNTS
         if self.level is None:
             level = Fraction((1 << len(FAULTS)) - 1 if self.kind == "bits" else 0)
@@ -300,6 +301,7 @@ class TickScope:
 
     def request(self, chosen: Sequence[str], ticks: int, samples: int, trigger: Trigger) -> None:
         """Sends the request to record."""
+        level = trigger.counts(self.axis.period_nm, self.tick_hz)
         self.axis.request(
             "record_ticks",
             signals=sum(1 << SIGNALS[name] for name in chosen),
@@ -308,7 +310,7 @@ class TickScope:
             samples=samples,
             earlier=trigger.earlier,
             delay=trigger.delay,
-            level=trigger.counts(self.axis.period_nm, self.tick_hz),
+            level=level,
         )
 
     def progress(self) -> tuple[str, int]:
@@ -417,7 +419,9 @@ class TickScope:
         """
         chosen, ticks = self.chosen(signals), self.ticks(every)
         self.longest(chosen)  # there is a recorder
-        left = None if duration is None else round(units.parse_time(duration) / ticks * self.tick_hz)
+        left = (
+            None if duration is None else round(units.parse_time(duration) / ticks * self.tick_hz)
+        )
         setting = Setting(self.axis.number, chosen, 0, ticks)
         self.request(chosen, ticks, 0, NOW)
         words: list[int] = []
