@@ -18,7 +18,7 @@ for the others.
 import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy
@@ -138,6 +138,14 @@ class TickRecord:
         return report.png(figure)
 
 
+def joined(records: Sequence[TickRecord]) -> TickRecord:
+    """Records that follow one another as one."""
+    values = {
+        name: numpy.concatenate([one.values[name] for one in records]) for name in records[0].values
+    }
+    return replace(records[0], values=values)
+
+
 def signed(words: ArrayLike, bits: int) -> Array:
     """Unsigned words as numbers in two's complement."""
     whole = numpy.asarray(words, numpy.int64)
@@ -166,9 +174,7 @@ class Trigger:
     def counts(self, period_nm: Fraction, tick_hz: int) -> int:
         """The level in LSB of the signal; raises UnitError or OutOfRange."""
         if self.kind not in TRIGGERS:
-            raise OutOfRange(
-                f"there is no trigger '{self.kind}': there are {', '.join(TRIGGERS)}"
-            )
+            raise OutOfRange(f"there is no trigger '{self.kind}': there are {', '.join(TRIGGERS)}")
         if self.signal not in SIGNALS:
             raise OutOfRange(
                 f"there is no signal '{self.signal}' to trigger: there are {', '.join(SIGNALS)}"
@@ -274,7 +280,7 @@ class TickScope:
             )
         if not 0 <= trigger.earlier < count or not 0 <= trigger.delay <= LONGEST_DELAY:
             raise OutOfRange(
-                f"{trigger.earlier} samples from before the trigger, or {trigger.delay} ticks after "
+                f"{trigger.earlier} samples before the trigger, or {trigger.delay} ticks after "
                 f"it: from 0 to {count - 1}, or to {LONGEST_DELAY}"
             )
         self.request(chosen, ticks, count, trigger)
