@@ -128,6 +128,7 @@ module axis #(
     input wire chain_disagreement,  // level: position and count differ
     input wire chain_lost,  // strobe: a sample of this axis was lost
     // to a recorder
+    output logic signed [47:0] target,  // 2^-16 period, held
     output logic [15:0] phase,  // 2^-16 period, corrected
     output logic signed [15:0] fine_command,  // of the fine stage, full scale 2^15
     output logic [12:0] faults,  // latched; bits as in axis_registers.faults
@@ -179,7 +180,6 @@ module axis #(
     wire [ 5:0] encoder_events;
     wire sample_rejected, pulse_rejected, encoder_fault, position_valid, zero_up, zero_down;
     // target and command
-    wire signed [47:0] target;
     wire signed [31:0] velocity, error;
     wire signed [15:0] command, servo_command;
     wire [4:0] queue_free;

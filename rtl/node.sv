@@ -176,6 +176,7 @@ module node #(
     wire [ 1:0] scope_phase;
     wire [16:0] scope_available;
     wire [16*AXES-1:0] phases, fine_commands;
+    wire        [48*AXES-1:0] targets;
     wire        [13*AXES-1:0] axis_faults;
     wire        [       12:0] excitation_period;
     wire        [       14:0] excitation_limit;
@@ -538,6 +539,7 @@ module node #(
             .tick,
             .ready         (first),
             .sine_cosine   ({16'($signed(cosine)), 16'($signed(sine))}),
+            .target        (targets[48*scope_axis+:32]),
             .position      (position[48*scope_axis+:32]),
             .interpolated  (32'(phases[16*scope_axis+:16])),
             .fine_command  (32'($signed(fine_commands[16*scope_axis+:16]))),
@@ -561,7 +563,7 @@ module node #(
         wire unused_scope = &{
             1'b0, scope_axis, scope_signals, scope_trigger, scope_mode, scope_level, scope_length,
             scope_every, scope_earlier, scope_delay, scope_start, scope_read, phases,
-            fine_commands, axis_faults
+            fine_commands, axis_faults, targets
         };
         wire unused_excitation = &{
             1'b0, excitation_axis, excitation_period, excitation_limit, excitation_value,
@@ -855,6 +857,7 @@ module node #(
             .chain_disagreement   (chain_disagreement[n]),
             .chain_lost           (chain_lost[n]),
             // tick_recorder
+            .target               (targets[48*n+:48]),
             .phase                (phases[16*n+:16]),
             .fine_command         (fine_commands[16*n+:16]),
             .faults               (axis_faults[13*n+:13]),

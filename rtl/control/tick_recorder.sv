@@ -8,8 +8,8 @@
 //          meanwhile
 // rate     one word per cycle while it records; one word per 2 cycles while it is read
 // behaviour A sample begins at a tick and ends with the command of that tick. Its words are in the
-//          order of the bits of signals; those of numbers 1 to 5 are results, the others are taken
-//          in the cycles after the tick in which there is no result.
+//          order of the bits of signals. Numbers 1 to 5 are results; the others, and what stands for
+//          1 and 2 without a result, are taken in the cycles after the tick that have no result.
 //          The trigger looks at one signal of each sample once there are `earlier` samples: mode 0
 //          always, 1 it rises to level, 2 it falls below it, 3 its size reaches level, 4 it has a
 //          bit of level. Without delay that sample follows the `earlier` ones; with delay it is the
@@ -42,6 +42,7 @@ module tick_recorder #(
     input  wire         tick,            // strobe: servo tick
     input  wire         ready,           // level: the sample after a delay may begin
     input  wire  [31:0] sine_cosine,     // samples of the axis, cosine in the upper half
+    input  wire  [31:0] target,          // the last result 1 of the axis
     input  wire  [31:0] position,        // 2^-16 period, low word
     input  wire  [31:0] interpolated,    // phase, 2^-16 period
     input  wire  [31:0] fine_command,    // full scale 2^15, signed
@@ -63,7 +64,7 @@ module tick_recorder #(
     end
 
     localparam [2:0] COMMAND = 3'd5;  // kind of result, as in tables/engine_microcode.py
-    localparam [2:0] TAKEN = 3'd5;  // signals that are no results
+    localparam [2:0] TAKEN = 3'd7;  // signals that are taken
     localparam [1:0] EMPTY = 2'd0, WAITING = 2'd1, RECORDING = 2'd2, FULL = 2'd3;
     localparam [2:0] ALWAYS = 3'd0, RISES = 3'd1, FALLS = 3'd2, BEYOND = 3'd3, BITS = 3'd4;
     localparam int A = $clog2(WORDS);
@@ -78,9 +79,11 @@ module tick_recorder #(
     logic [A-1:0] base, at;  // first word of the sample; word that is read
     logic [16:0] used;  // words of complete samples that are kept
     logic [15:0] kept, passed, left;  // samples; ticks since the last one, and of the delay
-    logic [2:0] take;  // the next signal that is no result; TAKEN: none
+    logic [2:0] take;  // the next signal that is taken; TAKEN: none
+    logic [1:0] got;  // results 1 and 2 have come in this sample
     logic begun, sampling, delaying;  // there is a sample; it is not complete; the delay runs
-    logic hit, known, was_above;  // this sample triggers; the signal was seen, above the level
+    logic [31:0] watched;  // signal of the trigger
+    logic known, was_above;  // it was seen in a sample; it was above the level
 
     // the words of a sample
     wire          active = phase == WAITING || phase == RECORDING;
@@ -88,45 +91,47 @@ module tick_recorder #(
     wire          due = active && tick && over;
     wire          given = valid && sampling && result_axis == axis && kind != '0 && kind <= COMMAND;
     wire          taken = sampling && !given && take != TAKEN;
-    wire  [  3:0] number = given ? 4'(kind) : take == '0 ? 4'd0 : 4'(COMMAND) + 4'(take);
+    wire  [  3:0] number = given ? 4'(kind) : take < 3'd3 ? 4'(take) : 4'(take) + 4'd3;
+    wire          stale = taken && |(got &{number == 4'd2, number == 4'd1});
+    wire          new_value = !due && !stale && (given || taken);
     wire  [  9:0] chosen = 10'd1 << number;
     wire  [A-1:0] place = base + A'(ones(signals & (chosen - 1'b1)));
-    wire          keep = !due && (given || taken) && |(signals & chosen);
+    wire          keep = new_value && |(signals & chosen);
 
     logic [ 31:0] value;
     always_comb begin
         case (take)
             3'd0: value = sine_cosine;
-            3'd1: value = position;
-            3'd2: value = interpolated;
-            3'd3: value = fine_command;
+            3'd1: value = target;
+            3'd2: value = '0;  // velocity of a target that does not move
+            3'd3: value = position;
+            3'd4: value = interpolated;
+            3'd5: value = fine_command;
             default: value = faults;
         endcase
         if (given) value = result;
     end
 
-    // the trigger
-    wire  looks = !due && (given || taken) && number == trigger_signal;
-    wire  above = $signed(value) >= $signed(level);
-    wire  below = $signed(value) <= -$signed(level);
-    logic hits;
+    // the trigger, at the end of a sample
+    wire         ends = given && kind == COMMAND && !due;
+    wire  [31:0] seen = trigger_signal == 4'(COMMAND) ? value : watched;
+    wire         above = $signed(seen) >= $signed(level);
+    wire         below = $signed(seen) <= -$signed(level);
+    logic        hits;
     always_comb begin
         case (trigger_mode)
             RISES:   hits = known && above && !was_above;
             FALLS:   hits = known && !above && was_above;
             BEYOND:  hits = above || below;
-            BITS:    hits = |(value & level);
-            default: hits = 1'b0;
+            BITS:    hits = |(seen & level);
+            default: hits = trigger_mode == ALWAYS;
         endcase
     end
-    wire        seen = trigger_mode == ALWAYS || hit || looks && hits;
-
     // the end of a sample
     wire [16:0] each = 17'(ones(signals));
-    wire        ends = given && kind == COMMAND && !due;
     wire        fits = used + each + each <= 17'(WORDS);  // this sample and one more
     wire        ripe = kept == earlier || !fits;
-    wire        counts = phase == RECORDING || delaying || seen && ripe && delay == '0;
+    wire        counts = phase == RECORDING || delaying || hits && ripe && delay == '0;
     wire        drops = ends && !counts && ripe;  // the oldest sample
     wire        last = !fits || length != '0 && kept + 1'b1 >= length;
     wire        passes = read && available != '0;
@@ -146,21 +151,22 @@ module tick_recorder #(
             if (left > 16'd1) left <= left - 1'b1;
         end
         if (taken) take <= take + 1'b1;
-        if (looks) begin
-            hit <= hits;
-            {known, was_above} <= {1'b1, above};
-        end
+        if (given && kind == 3'd1) got[0] <= 1'b1;
+        if (given && kind == 3'd2) got[1] <= 1'b1;
+        if (new_value && number == trigger_signal) watched <= value;
         if (ends) begin
             sampling <= 1'b0;
+            {known, was_above} <= {1'b1, above};
             base <= base + each[A-1:0];
             if (!drops) kept <= kept + 1'b1;
             if (counts) phase <= last ? FULL : RECORDING;
-            delaying <= !counts && seen && ripe;
-            if (seen && !delaying) left <= delay;
+            delaying <= !counts && hits && ripe;
+            if (hits && !delaying) left <= delay;
         end
         if (due) begin
-            {begun, sampling, hit} <= 3'b110;
+            {begun, sampling} <= 2'b11;
             take <= '0;
+            got  <= '0;
         end
         used <= used + (ends && !drops ? each : '0) - 17'(passes);
         at   <= at + (drops ? each[A-1:0] : A'(passes));

@@ -69,7 +69,6 @@ module one_axis_bench (
     wire compare_pulse, adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi;
 
     assign ready  = memory_ready && !waits;
-    assign target = u_axis.target;
     assign most_steps = 16'(1 << (u_axis.g_drive.u_actuator.g_stepper.u_steps.AHEAD_W - 2));
     assign rdata = live | feedback_rdata | actuator_rdata;
 
@@ -237,6 +236,7 @@ module one_axis_bench (
         .chain_overspeed   (chain_overspeed[1]),
         .chain_disagreement(chain_disagreement[1]),
         .chain_lost        (chain_lost[1]),
+        .target,
         .phase,
         .fine_command,
         .faults,

@@ -28,7 +28,7 @@ from tb.control.tick_recorder import (
 
 POSITION, FAULTS, ERROR = 6, 9, 4
 KINDS = (3, 1, 2, ERROR, COMMAND, 6, 0)  # of results, in the order of the engine
-EMPTIED = 8  # cycles in which all signals that are no results are taken
+EMPTIED = 9  # cycles in which all signals that are no results are taken
 
 
 async def begin(dut):
@@ -66,10 +66,12 @@ async def served(dut, model, number, ready=1, values=None, **settings):
     some signals; returns phase, available, triggered."""
     axis = settings.get("axis", 0)
     given = {n: word_of(number, n) for n in range(SIGNALS)} | (values or {})
+    before = word_of(number - 1, 1) & 0xFFFF_FFFF
     held = dict(
         settings,
         ready=ready,
         sine_cosine=given[0],
+        target=before,
         position=given[POSITION],
         interpolated=given[7],
         fine_command=given[8],
@@ -150,7 +152,7 @@ async def each_sample_has_the_chosen_signals_of_its_tick_in_order(dut):
 @cocotb.test()
 async def a_signal_waits_for_the_results_that_come_with_it(dut):
     model = await begin(dut)
-    settings = dict(signals=0b1111111111, length=1, faults=9, position=6)
+    settings = dict(signals=0b1111111111, length=1, faults=9, position=6, target=99)
     await cycle(dut, model, start=1, **settings)
     await cycle(dut, model, tick=1, **settings)
     for kind in (1, 2, 3, 4):
@@ -159,6 +161,23 @@ async def a_signal_waits_for_the_results_that_come_with_it(dut):
         await cycle(dut, model, **settings)
     await cycle(dut, model, valid=1, kind=COMMAND, result=5, **settings)
     assert await words(dut, model, 10) == [0, 1, 2, 3, 4, 5, 6, 0, 0, 9]
+
+
+@cocotb.test()
+async def a_target_at_rest_gives_no_results_and_is_recorded_with_no_velocity(dut):
+    model = await begin(dut)
+    settings = dict(signals=0b110, length=3, target=99)
+    settings |= dict(trigger_signal=2, trigger_mode=RISES, level=1, earlier=1)
+    await cycle(dut, model, start=1, **settings)
+    for velocity in (None, 7, 7, None, 7):
+        await cycle(dut, model, tick=1, **settings)
+        for _ in range(EMPTIED):
+            await cycle(dut, model, **settings)
+        for kind, result in ((1, 50), (2, velocity)):
+            if velocity:
+                await cycle(dut, model, valid=1, kind=kind, result=result, **settings)
+        await cycle(dut, model, valid=1, kind=COMMAND, **settings)
+    assert await words(dut, model, 6) == [99, 0, 50, 7, 50, 7]
 
 
 @cocotb.test()
@@ -307,6 +326,7 @@ async def any_use_matches_the_model_in_every_cycle(dut):
                 tick=int(random.random() < 0.1),
                 ready=random.getrandbits(1),
                 sine_cosine=random.getrandbits(32),
+                target=random.getrandbits(32),
                 position=random.getrandbits(32),
                 interpolated=random.getrandbits(16),
                 fine_command=random.getrandbits(32),

@@ -3,7 +3,7 @@
 
 COMMAND = 5
 SIGNALS = 10
-TAKEN = (0, 6, 7, 8, 9)  # signals that are no results, in the order in which they are taken
+TAKEN = (0, 1, 2, 6, 7, 8, 9)  # signals that are taken, in this order
 EMPTY, WAITING, RECORDING, FULL = range(4)
 ALWAYS, RISES, FALLS, BEYOND, BITS = range(5)
 IDLE = dict(
@@ -20,6 +20,7 @@ IDLE = dict(
     tick=0,
     ready=1,
     sine_cosine=0,
+    target=0,
     position=0,
     interpolated=0,
     fine_command=0,
@@ -47,7 +48,8 @@ class TickRecorder:
         self.words, self.memory, self.word = words, [None] * words, None
         self.phase = EMPTY
         self.base = self.at = self.used = self.kept = self.passed = self.left = self.take = 0
-        self.begun = self.sampling = self.delaying = self.hit = self.known = self.was_above = 0
+        self.begun = self.sampling = self.delaying = self.known = self.was_above = 0
+        self.got, self.watched = set(), None
 
     def step(self, **inputs):
         i = IDLE | inputs
@@ -69,23 +71,29 @@ class TickRecorder:
             number, value = i["kind"], i["result"]
         elif taken:
             number = TAKEN[self.take]
-            names = ("sine_cosine", "position", "interpolated", "fine_command", "faults")
-            value = i[names[self.take]]
-        looks = not due and number == i["trigger_signal"]
+            taken_values = (
+                *(i["sine_cosine"], i["target"], 0, i["position"]),
+                *(i["interpolated"], i["fine_command"], i["faults"]),
+            )
+            value = taken_values[self.take]
+        new_value = not due and number is not None and not (taken and number in self.got)
+        ends = given and i["kind"] == COMMAND and not due
         hits = above = False
-        if looks:
-            above = signed(value) >= signed(i["level"])
-            hits = {
-                RISES: self.known and above and not self.was_above,
-                FALLS: self.known and not above and self.was_above,
-                BEYOND: above or signed(value) <= signed(-signed(i["level"])),
-                BITS: value & i["level"] != 0,
-            }.get(i["trigger_mode"], False)
-        seen = i["trigger_mode"] == ALWAYS or self.hit or hits
+        if ends:
+            seen = value if i["trigger_signal"] == COMMAND else self.watched
+            if seen is not None:
+                above = signed(seen) >= signed(i["level"])
+                hits = {
+                    RISES: self.known and above and not self.was_above,
+                    FALLS: self.known and not above and self.was_above,
+                    BEYOND: above or signed(seen) <= signed(-signed(i["level"])),
+                    BITS: seen & i["level"] != 0,
+                }.get(i["trigger_mode"], False)
+            hits = hits or i["trigger_mode"] == ALWAYS
         readable = self.available(i["length"])
         passes = i["read"] and readable
 
-        if not due and number is not None and i["signals"] >> number & 1:
+        if new_value and i["signals"] >> number & 1:
             below = (i["signals"] & (1 << number) - 1).bit_count()
             self.memory[(self.base + below) % self.words] = value
         else:
@@ -93,33 +101,34 @@ class TickRecorder:
 
         fits = self.used + 2 * each <= self.words
         ripe = self.kept == i["earlier"] or not fits
-        ends = given and i["kind"] == COMMAND and not due
-        counts = self.phase == RECORDING or self.delaying or seen and ripe and i["delay"] == 0
+        counts = self.phase == RECORDING or self.delaying or hits and ripe and i["delay"] == 0
         last = not fits or i["length"] and (self.kept + 1) % 65536 >= i["length"]
         if active and i["tick"]:
             self.passed = 0 if due else (self.passed + 1) % 65536
             self.left -= self.left > 1
         self.take += bool(taken)
-        if looks:
-            self.hit, self.known, self.was_above = hits, True, above
+        if given and number in (1, 2):
+            self.got.add(number)
+        if new_value and number == i["trigger_signal"]:
+            self.watched = value
         if ends:
-            self.sampling = 0
+            self.sampling, self.known, self.was_above = 0, True, above
             self.base = (self.base + each) % self.words
             if counts or not ripe:
                 self.kept = (self.kept + 1) % 65536
                 self.used += each
             else:
                 self.at = (self.at + each) % self.words
-            if seen and not self.delaying:
+            if hits and not self.delaying:
                 self.left = i["delay"]
-            self.delaying = not counts and seen and ripe
+            self.delaying = not counts and hits and ripe
             if counts:
                 self.phase = FULL if last else RECORDING
         if passes:
             self.used -= 1
             self.at = (self.at + 1) % self.words
         if due:
-            self.begun, self.sampling, self.hit, self.take = 1, 1, 0, 0
+            self.begun, self.sampling, self.take, self.got = 1, 1, 0, set()
         if i["start"]:
             self.phase = WAITING
             self.begun = self.sampling = self.delaying = self.known = 0

@@ -261,4 +261,14 @@ def test_scope_record_and_save_write_files_with_units(tmp_path):
         "command_of_full_scale",
         "position_nm",
     ]
+    call = Call(
+        "scope record --signals velocity --trigger rises --of command --level=-45% --before 5 "
+        f"--samples 20 -- scope save {table} --timeout 2s -- "
+        f"scope stream {tmp_path / 'b.csv'} --signals error --every 1ms --time 50ms".split(),
+        node_of(),
+    )
+    assert call.code == 0, call.err
+    assert "5 of them before the trigger" in call.out and "1000 words/s without a gap" in call.out
+    assert parquet.read_table(table)["time_s"].to_pylist()[5] == 0
+    assert len((tmp_path / "b.csv").read_text().splitlines()) == 51
     assert "no signal 'sped'" in sentence(Call("scope record --signals sped", node_of()), 2)

@@ -528,7 +528,7 @@ class TickScope:
             0,
             axis.speed,
             axis.error,
-            axis.word.get(d["AXIS_COMMAND"], 0),
+            signed(axis.word.get(d["AXIS_COMMAND"], 0) & 0xFFFF, 16),
             axis.position,
             axis.position & 0xFFFF,
             0,

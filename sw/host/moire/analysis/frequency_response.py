@@ -329,6 +329,10 @@ def measure(
     wished = speed_nm_s(axis) if speed is None else float(speed)
     tuning = in_force(axis)
     check_room(axis, high, wished, records)
+    begin_nm = far_nm = Fraction(axis.status().target_nm)
+    if wished:
+        begin_nm, far_nm = ends_of_stroke(axis, stroke(axis, PERIOD, wished, APPROACH))
+    motion = Motion(wished, begin_nm, far_nm >= begin_nm)
     done = 0
 
     def one_more() -> None:
@@ -337,21 +341,17 @@ def measure(
         progress(done, 2 * records)
 
     def work() -> Response:
-        response = recorded(axis, high, wished, records, one_more)
+        response = recorded(axis, high, motion, records, one_more)
         low = low_band(response, high, low_hz, wished / float(axis.period_nm) * COUNTS)
         if low is None:
             return response
         factor = softness(response, low_hz)
         soft = lambda: softened(axis, tuning, factor)
-        return joined(recorded(axis, low, wished, records, one_more, soft), response, tuning)
+        return joined(recorded(axis, low, motion, records, one_more, soft), response, tuning)
 
-    start_nm, override = axis.status().target_nm, axis.override()
-    try:
-        response = axis.stopping_on_error(work)
-    finally:
-        axis.override(override)
+    response = axis.stopping_on_error(work)
     if wished:
-        axis.move(nm=start_nm)
+        axis.move(nm=begin_nm)
     return check(response)
 
 
@@ -380,10 +380,24 @@ def check_room(axis: Axis, excitation: Excitation, speed_nm_s: float, records: i
         )
 
 
+@dataclass(frozen=True)
+class Motion:
+    """How an axis moves while it is measured."""
+
+    speed_nm_s: float  # 0: not at all
+    begin_nm: Fraction  # where it stands at the beginning, and at the end
+    up: bool  # it moves above that place, else below it
+
+    def ends_nm(self, stroke_nm: Fraction | int) -> list[Fraction]:
+        """The lowest and the highest position of a motion of this length."""
+        far_nm = self.begin_nm + (stroke_nm if self.up else -stroke_nm)
+        return sorted([self.begin_nm, far_nm])
+
+
 def recorded(
     axis: Axis,
     excitation: Excitation,
-    speed_nm_s: float,
+    motion: Motion,
     records: int,
     progress: Callable[[], object],
     soft: Callable[[], AbstractContextManager[None]] | None = None,
@@ -396,11 +410,8 @@ def recorded(
     scope, length = TickScope(axis), len(excitation.values)
     every = excitation.sparse
     scope.load(excitation.values)
-    ends_nm = [Fraction(0), Fraction(0)]
-    if speed_nm_s:
-        approach = 0.0 if soft is None else APPROACH
-        stroke_nm = stroke(axis, (SETTLING_PERIODS + PERIODS) * length, speed_nm_s)
-        ends_nm = sorted(ends_of_stroke(axis, Fraction(stroke_nm * (1 + approach))))
+    speed_nm_s, approach = motion.speed_nm_s, 0.0 if soft is None else APPROACH
+    ends_nm = motion.ends_nm(stroke(axis, length, speed_nm_s, approach) if speed_nm_s else 0)
     errors, commands = [], []
     for number in range(records):
         trigger = Trigger(delay=SETTLING_PERIODS * length + 1)
@@ -409,8 +420,7 @@ def recorded(
             trigger = at_speed(axis, speed_nm_s, trigger.delay)
             axis.move(nm=begin_nm)
             if soft is not None:
-                begin_nm += Fraction(stroke_nm * approach)
-                axis.move(nm=begin_nm)
+                axis.move(nm=begin_nm + (end_nm - begin_nm) * Fraction(approach / (1 + approach)))
         with nullcontext() if soft is None else soft(), scope.excited(length):
             scope.start(
                 SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s), trigger
@@ -438,8 +448,9 @@ def top_speed_nm_s(axis: Axis) -> float:
     return axis.get_parameter("velocity").counts * float(axis.period_nm)
 
 
-def stroke(axis: Axis, ticks: int, speed_nm_s: float) -> float:
-    """The length in nm of a motion that is at this speed for so many ticks.
+def stroke(axis: Axis, period: int, speed_nm_s: float, approach: float) -> Fraction:
+    """The length in nm of the motion of a record with this period in ticks, and before it the
+    approach, a share of it.
 
     It begins and ends as at full override, but slower.
     """
@@ -447,7 +458,8 @@ def stroke(axis: Axis, ticks: int, speed_nm_s: float) -> float:
         axis.get_parameter(name).counts for name in ("velocity", "acceleration", "jerk")
     )
     ramps_nm = top_speed_nm_s(axis) * (velocity / acceleration + acceleration / jerk)
-    return SPARE * (speed_nm_s * ticks / axis.node.identity.tick_hz + ramps_nm)
+    lasts_s = (SETTLING_PERIODS + PERIODS) * period / axis.node.identity.tick_hz
+    return Fraction(SPARE * (1 + approach) * (speed_nm_s * lasts_s + ramps_nm))
 
 
 @contextmanager
