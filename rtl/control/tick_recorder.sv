@@ -8,8 +8,8 @@
 //          meanwhile
 // rate     one word per cycle while it records; one word per 2 cycles while it is read
 // behaviour A sample begins at a tick and ends with the command of that tick. Its words are in the
-//          order of the bits of signals. Numbers 1 to 5 are results; the others, and the values of 1
-//          and 2 while there are none, are taken in the cycles after the tick without a result.
+//          order of the bits of signals. Numbers 1 to 5 are results; the others, and 1 and 2 while
+//          there are none, are taken in the cycles after the tick that have no result.
 //          The trigger looks at one signal of each sample once there are `earlier` samples: mode 0
 //          always, 1 it rises to level, 2 it falls below it, 3 its size reaches level, 4 it has a
 //          bit of level. Without delay that sample follows the `earlier` ones; with delay it is the

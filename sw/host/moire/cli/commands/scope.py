@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -20,6 +21,7 @@ from moire.made.bus_tables import SCOPE_STATES, TICK_SIGNALS, TICK_TRIGGERS
 if TYPE_CHECKING:
     from moire.analysis.tick_scope import TickRecord
 
+TIMEOUT = partial(click.option, "--timeout", type=TIME, default="10s", metavar="TIME")
 EXAMPLE = (
     "moire --port twin home -- scope arm --trigger motion -- move 100um -- scope read move.csv"
 )
@@ -92,11 +94,7 @@ def arm(call: Call, trigger: str, before: int, every: Fraction, level: Fraction)
     metavar="PNG",
     help="Draw position, error and drive command over time.",
 )
-@click.option(
-    "--timeout",
-    type=TIME,
-    default="10s",
-    metavar="TIME",
+@TIMEOUT(
     help="The command gives up after this time. The default is 10s.",
 )
 def read(call: Call, file: str, picture: str | None, timeout: Fraction) -> None:
@@ -240,11 +238,7 @@ def record(
 )
 @click.argument("file", type=FILE, metavar="FILE", help=f"Time 0 is the trigger. {COLUMNS}")
 @PICTURE
-@click.option(
-    "--timeout",
-    type=TIME,
-    default="10s",
-    metavar="TIME",
+@TIMEOUT(
     help="The longest wait for the trigger, in the time of the node. The default is 10s.",
 )
 def save(call: Call, file: str, picture: str | None, timeout: Fraction) -> None:
