@@ -127,6 +127,11 @@ module axis #(
     input wire chain_overspeed,  // strobe: the speed is too high
     input wire chain_disagreement,  // level: position and count differ
     input wire chain_lost,  // strobe: a sample of this axis was lost
+    // to a recorder
+    output logic signed [47:0] target,  // 2^-16 period, held
+    output logic [15:0] phase,  // 2^-16 period, corrected
+    output logic signed [15:0] fine_command,  // of the fine stage, full scale 2^15
+    output logic [12:0] faults,  // latched; bits as in axis_registers.faults
     // pins of the machine
     input wire limit_low_open,  // pin, 1: pressed or wire cut
     input wire limit_high_open,  // pin, 1: pressed or wire cut
@@ -171,18 +176,17 @@ module axis #(
     wire [1:0] probe_level;
     // measuring path
     wire signed [W-1:0] sin, cos;
-    wire [15:0] phase, amplitude;
-    wire [5:0] encoder_events;
+    wire [15:0] amplitude;
+    wire [ 5:0] encoder_events;
     wire sample_rejected, pulse_rejected, encoder_fault, position_valid, zero_up, zero_down;
     // target and command
-    wire signed [47:0] target;
     wire signed [31:0] velocity, error;
     wire signed [15:0] command, servo_command;
     wire [4:0] queue_free;
     wire moving, armed, saturated, line_up, line_down, underrun;
     wire compared, too_far, commanded;
     // interlock and drive
-    wire [12:0] faults, causes_now, first_fault;
+    wire [12:0] causes_now, first_fault;
     wire signed [47:0] fault_position;
     wire downward, fine_saturated;
 
@@ -433,6 +437,7 @@ module axis #(
             .dac_sdi,
             // state
             .downward,
+            .fine_command,
             .fine_saturated,
             .step_overrun
         );
@@ -442,7 +447,7 @@ module axis #(
         assign {drive_enable, faults, causes_now, first_fault, fault_position} = '0;
         assign {bridge_a, bridge_b, step, direction} = '0;
         assign {dac_cs_n, dac_sclk, dac_sdi} = 3'b100;
-        assign {actuator_rdata, downward, fine_saturated} = '0;
+        assign {actuator_rdata, downward, fine_command, fine_saturated} = '0;
         assign line_stopped = 1'b1;
 
         wire unused_bus = &{1'b0, actuator_select, start};

@@ -167,14 +167,21 @@ module node #(
     wire [32*AXES-1:0] stream_states, stream_counts;
     // recorder of ticks, excitation
     wire [2:0] scope_axis, excitation_axis;
-    wire [5:0] scope_signals;
-    wire [15:0] scope_length, scope_every;
-    wire scope_start, scope_read, scope_recording, scope_full, excitation_written;
-    wire        [31:0] scope_word;
-    wire        [12:0] excitation_period;
-    wire        [14:0] excitation_limit;
-    wire signed [15:0] excitation_value;
-    wire        [11:0] excitation_at;
+    wire [9:0] scope_signals;
+    wire [3:0] scope_trigger;
+    wire [2:0] scope_mode;
+    wire [15:0] scope_length, scope_every, scope_earlier, scope_delay;
+    wire scope_start, scope_read, excitation_written;
+    wire [31:0] scope_level, scope_word;
+    wire [ 1:0] scope_phase;
+    wire [16:0] scope_available;
+    wire [16*AXES-1:0] phases, fine_commands;
+    wire        [48*AXES-1:0] targets;
+    wire        [13*AXES-1:0] axis_faults;
+    wire        [       12:0] excitation_period;
+    wire        [       14:0] excitation_limit;
+    wire signed [       15:0] excitation_value;
+    wire        [       11:0] excitation_at;
     // lines of motor steps
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;
@@ -349,11 +356,16 @@ module node #(
         // recorder of ticks
         .scope_axis,
         .scope_signals,
+        .scope_trigger,
+        .scope_mode,
         .scope_samples_length    (scope_length),
         .scope_samples_every     (scope_every),
-        .scope_state_start       (scope_start),
-        .scope_state_recording   (scope_recording),
-        .scope_state_full        (scope_full),
+        .scope_place_earlier     (scope_earlier),
+        .scope_place_delay       (scope_delay),
+        .scope_level,
+        .scope_level_written     (scope_start),
+        .scope_state_phase       (scope_phase),
+        .scope_state_available   (scope_available),
         .scope_word,
         .scope_word_read         (scope_read),
         // excitation
@@ -483,7 +495,7 @@ module node #(
     );
 
     if (SCOPE_WORDS != 0) begin : g_scope
-        wire         first;
+        wire first, triggered;
         wire [W-1:0] sine = sample_sin[W*scope_axis+:W];
         wire [W-1:0] cosine = sample_cos[W*scope_axis+:W];
 
@@ -493,6 +505,7 @@ module node #(
             // settings
             .axis       (excitation_axis),
             .period     (excitation_period),
+            .running    (triggered),
             .limit      (excitation_limit),
             .store      (excitation_written),
             .store_at   (excitation_at),
@@ -512,31 +525,45 @@ module node #(
             .clk,
             .rst,
             // settings
-            .start      (scope_start),
-            .axis       (scope_axis),
-            .signals    (scope_signals),
-            .length     (scope_length),
-            .every      (scope_every),
+            .start         (scope_start),
+            .axis          (scope_axis),
+            .signals       (scope_signals),
+            .trigger_signal(scope_trigger),
+            .trigger_mode  (scope_mode),
+            .level         (scope_level),
+            .length        (scope_length),
+            .every         (scope_every),
+            .earlier       (scope_earlier),
+            .delay         (scope_delay),
             // what is recorded
             .tick,
-            .ready      (first),
-            .sine_cosine({16'($signed(cosine)), 16'($signed(sine))}),
-            .valid      (result_valid),
+            .ready         (first),
+            .sine_cosine   ({16'($signed(cosine)), 16'($signed(sine))}),
+            .target        (targets[48*scope_axis+:32]),
+            .position      (position[48*scope_axis+:32]),
+            .interpolated  (32'(phases[16*scope_axis+:16])),
+            .fine_command  (32'($signed(fine_commands[16*scope_axis+:16]))),
+            .faults        (32'(axis_faults[13*scope_axis+:13])),
+            .valid         (result_valid),
             .result_axis,
-            .kind       (result_kind),
-            .result     (result[31:0]),
+            .kind          (result_kind),
+            .result        (result[31:0]),
             // reading
-            .read       (scope_read),
-            .word       (scope_word),
-            .recording  (scope_recording),
-            .full       (scope_full)
+            .read          (scope_read),
+            .word          (scope_word),
+            .phase         (scope_phase),
+            .available     (scope_available),
+            // excitation
+            .triggered
         );
     end else begin : g_no_scope
         assign result = computed;
-        assign {scope_word, scope_recording, scope_full} = '0;
+        assign {scope_word, scope_phase, scope_available} = '0;
 
         wire unused_scope = &{
-            1'b0, scope_axis, scope_signals, scope_length, scope_every, scope_start, scope_read
+            1'b0, scope_axis, scope_signals, scope_trigger, scope_mode, scope_level, scope_length,
+            scope_every, scope_earlier, scope_delay, scope_start, scope_read, phases,
+            fine_commands, axis_faults, targets
         };
         wire unused_excitation = &{
             1'b0, excitation_axis, excitation_period, excitation_limit, excitation_value,
@@ -829,6 +856,11 @@ module node #(
             .chain_overspeed      (chain_overspeed[n]),
             .chain_disagreement   (chain_disagreement[n]),
             .chain_lost           (chain_lost[n]),
+            // tick_recorder
+            .target               (targets[48*n+:48]),
+            .phase                (phases[16*n+:16]),
+            .fine_command         (fine_commands[16*n+:16]),
+            .faults               (axis_faults[13*n+:13]),
             // pins of the machine
             .limit_low_open       (limit_low_open[n]),
             .limit_high_open      (limit_high_open[n]),

@@ -117,8 +117,8 @@ module register_layout #(
         case (entry)
             9'h006, 9'h090: mask = 32'h00FFFFFF;
             9'h007, 9'h013, 9'h04C, 9'h084, 9'h099: mask = 32'h0000FFFF;
-            9'h00C: mask = 32'h000001FF;
-            9'h00D, 9'h010, 9'h014, 9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
+            9'h00C: mask = 32'h7F03FF07;
+            9'h00D, 9'h00E, 9'h00F, 9'h010, 9'h014, 9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
             9'h011, 9'h015, 9'h050, 9'h102: mask = 32'h000000FF;
             9'h018: mask = 32'h7FFFFFFF;
             9'h040, 9'h08A, 9'h08F, 9'h100: mask = 32'h000FFFFF;
