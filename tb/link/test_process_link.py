@@ -31,6 +31,7 @@ INPUTS = {
     "rx_data": 0,
     "rx_ends": 0,
     "rx_broken": 0,
+    "rx_foreign": 0,
     "tx_taken": 1,
     "ready": 1,
     "rdata": 0,
@@ -58,7 +59,8 @@ class Node:
         traffic = {"enable": enable, "valid": inputs["rx_valid"], "data": inputs["rx_data"]}
         accepted, bank, refused, put, put_at, word = self.receiver.outputs(**traffic)
         want = dict(zip(NAMES, self.player.outputs(), strict=True))
-        for name, level in (want | {"refused": refused, "expired": self.expired}).items():
+        others = {"refused": refused, "expired": self.expired, "accepted": accepted}
+        for name, level in (want | others).items():
             if level is not None and self.cycles:
                 got = int(getattr(self.dut, name).value)
                 assert got == level, f"cycle {self.cycles}: {name} is {got:#x}, not {level:#x}"
@@ -81,6 +83,7 @@ class Node:
             now=now,
             ends=inputs["rx_ends"],
             broken=inputs["rx_broken"],
+            foreign=inputs["rx_foreign"],
             busy=want["busy"],
             rst=rst,
         )
