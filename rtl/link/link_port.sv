@@ -20,40 +20,40 @@ module link_port #(
     input  wire         clk,
     input  wire         rst,
     // register bus, as one of its blocks
-    input  wire         select,             // strobe: an access to this block
-    input  wire         write,              // level: the access writes
-    input  wire  [ 5:0] word,               // 32-bit word of the block
-    input  wire  [31:0] wdata,              // value to write
-    output logic [31:0] rdata,              // value read, in the next cycle; else 0
+    input  wire         select,              // strobe: an access to this block
+    input  wire         write,               // level: the access writes
+    input  wire  [ 5:0] word,                // 32-bit word of the block
+    input  wire  [31:0] wdata,               // value to write
+    output logic [31:0] rdata,               // value read, in the next cycle; else 0
     // register bus, as one of its masters
-    output logic        request,            // level: an access waits for ready
-    input  wire         ready,              // level: the registers take it in the next cycle
-    output logic        link_select,        // strobe: an access
-    output logic        link_write,         // level: it writes
-    output logic [15:0] link_address,       // byte address, from 1 cycle before link_select on
-    output logic [31:0] link_wdata,         // word to be written
-    input  wire  [31:0] link_rdata,         // word read, 2 cycles after link_select
+    output logic        request,             // level: an access waits for ready
+    input  wire         ready,               // level: the registers take it in the next cycle
+    output logic        link_select,         // strobe: an access
+    output logic        link_write,          // level: it writes
+    output logic [15:0] link_address,        // byte address, from 1 cycle before link_select on
+    output logic [31:0] link_wdata,          // word to be written
+    input  wire  [31:0] link_rdata,          // word read, 2 cycles after link_select
     // node
-    input  wire  [31:0] now,                // cycles, time of the node
-    input  wire         drive_on,           // level: a drive is on, the host stays
-    output logic        watchdog_expired,   // level: no good request for too long
+    input  wire  [31:0] now,                 // cycles, time of the node
+    input  wire         drive_on,            // level: a drive is on, the host stays
+    output logic        watchdog_expired,    // level: no good request for too long
     // pins of the serial line
-    input  wire         link_rx,            // pin, idles high
-    output logic        link_tx,            // pin, idles high
-    output logic        link_driver_enable, // pin, 1: drive the line
+    input  wire         link_rx,             // pin, idles high
+    output logic        link_tx,             // pin, idles high
+    output logic        link_driver_enable,  // pin, 1: drive the line
     // UDP datagrams
-    input  wire         udp_rx_valid,       // level: a byte of a datagram
-    input  wire  [ 7:0] udp_rx_data,        // byte
-    input  wire         udp_rx_last,        // level: with udp_rx_valid, the last byte
-    input  wire         udp_rx_error,       // level: with udp_rx_valid, the datagram is damaged
-    input  wire  [47:0] udp_rx_sender,      // IP address, UDP port in bits 15:0
-    output logic        udp_rx_ready,       // level: with udp_rx_valid, the byte is taken
-    output logic        udp_tx_valid,       // level: a byte of a datagram
-    output logic [ 7:0] udp_tx_data,        // byte
-    output logic        udp_tx_last,        // level: with udp_tx_valid, the last byte
-    output logic [47:0] udp_tx_receiver,    // IP address, UDP port in bits 15:0
-    output logic [15:0] udp_tx_length,      // bytes of the datagram
-    input  wire         udp_tx_ready        // level: with udp_tx_valid, the byte is taken
+    input  wire         udp_rx_valid,        // level: a byte of a datagram
+    input  wire  [ 7:0] udp_rx_data,         // byte
+    input  wire         udp_rx_last,         // level: with udp_rx_valid, the last byte
+    input  wire         udp_rx_error,        // level: with udp_rx_valid, the datagram is damaged
+    input  wire  [47:0] udp_rx_sender,       // IP address, UDP port in bits 15:0
+    output logic        udp_rx_ready,        // level: with udp_rx_valid, the byte is taken
+    output logic        udp_tx_valid,        // level: a byte of a datagram
+    output logic [ 7:0] udp_tx_data,         // byte
+    output logic        udp_tx_last,         // level: with udp_tx_valid, the last byte
+    output logic [47:0] udp_tx_receiver,     // IP address, UDP port in bits 15:0
+    output logic [15:0] udp_tx_length,       // bytes of the datagram
+    input  wire         udp_tx_ready         // level: with udp_tx_valid, the byte is taken
 );
     if (BUILT == 0 || UDP == 0) begin : g_no_udp
         assign {udp_rx_ready, udp_tx_valid, udp_tx_data, udp_tx_last} = '0;
@@ -208,9 +208,7 @@ module link_port #(
 
             assign rx_foreign = 1'b0;
 
-            wire unused = &{
-                1'b0, ninth, start_glitch, receiving, transmitting, tick, accepted
-            };
+            wire unused = &{1'b0, ninth, start_glitch, receiving, transmitting, tick, accepted};
         end else begin : g_udp
             link_datagram u_datagram (
                 .clk,

@@ -66,10 +66,10 @@ module process_link #(
         .time_window,
         .now,
         // packets
-        .valid (rx_valid),
-        .data  (rx_data),
-        .ends  (rx_ends),
-        .broken(rx_broken),
+        .valid  (rx_valid),
+        .data   (rx_data),
+        .ends   (rx_ends),
+        .broken (rx_broken),
         .foreign(rx_foreign),
         // player
         .busy,

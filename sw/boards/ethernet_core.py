@@ -4,7 +4,8 @@ link of rtl/node.sv.
 
     PYTHONPATH=build/litex python -m boards.ethernet_core INTERFACE FAMILY CLK_HZ FILE
 
-INTERFACE to the PHY: mii (100 Mbit/s) or rgmii (1 Gbit/s). FAMILY: ecp5, xc7, or simulation. The
+INTERFACE to the PHY: mii (100 Mbit/s), rgmii (1 Gbit/s), or wide_mii, which is mii with the data
+path of rgmii. FAMILY: ecp5 or simulation. The
 file is Verilog with one module, `ethernet_core`; its port `udp` has the signals of the node's port
 as seen from the node. `boards.ethernet` runs this; `make litex` fetches LiteX and LiteEth.
 """
@@ -13,16 +14,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from litex.build.generic_platform import GenericPlatform, Pins, Subsignal
-from litex.build.lattice.platform import LatticePlatform
-from litex.build.sim.common import sim_special_overrides
-from litex.build.xilinx.platform import XilinxPlatform
-from litex.gen import LiteXModule
-from litex.soc.interconnect import stream
-from litex.soc.interconnect.packet import PacketFIFO
 from liteeth import phy
 from liteeth.common import eth_udp_user_description
 from liteeth.core import LiteEthUDPIPCore
+from litex.build.generic_platform import GenericPlatform, Pins, Subsignal
+from litex.build.lattice.platform import LatticePlatform
+from litex.build.sim.common import sim_special_overrides
+from litex.gen import LiteXModule
+from litex.soc.interconnect import stream
+from litex.soc.interconnect.packet import PacketFIFO
 from migen import ClockDomain, If, Signal
 
 from boards.ethernet import NAME
@@ -48,11 +48,14 @@ IO = [
     ),
 ]
 CLOCKS = ("clocks", 0, Subsignal("rx", Pins(1)), Subsignal("tx", Pins(1)))
+MII = ("rx_dv 1", "rx_data 4", "tx_en 1", "tx_data 4")
 PADS = {
-    "mii": ("rx_dv 1", "rx_data 4", "tx_en 1", "tx_data 4"),
+    "mii": MII,
+    "wide_mii": MII,
     "rgmii": ("rx_ctl 1", "rx_data 4", "tx_ctl 1", "tx_data 4"),
 }
-WIDTHS = {"mii": 8, "rgmii": 32}  # bits of the data path, so that it is faster than the wire
+# bits of the data path, so that it is faster than the wire
+WIDTHS = {"mii": 8, "wide_mii": 32, "rgmii": 32}
 
 
 def pads(interface: str) -> tuple[Any, ...]:
@@ -70,7 +73,7 @@ class EthernetCore(LiteXModule):
             self.cd_sys.clk.eq(platform.request("clk")),
             self.cd_sys.rst.eq(platform.request("rst")),
         ]
-        kind = {"mii": phy.LiteEthPHYMII, "rgmii": phy.LiteEthECP5PHYRGMII}[interface]
+        kind = phy.LiteEthECP5PHYRGMII if interface == "rgmii" else phy.LiteEthPHYMII
         # the PHY itself is reset by the board; its clock domains are reset with the node
         self.phy = kind(
             platform.request("clocks"), platform.request("pads"), with_hw_init_reset=False
@@ -78,13 +81,15 @@ class EthernetCore(LiteXModule):
         self.comb += self.phy.crg._reset.storage.eq(self.cd_sys.rst)
         width = WIDTHS[interface]
         fast = width > 8
+        # else the check of the FCS never fails
+        self.comb += self.phy.source.last_be.eq(self.phy.source.last)
         self.core = LiteEthUDPIPCore(
             self.phy,
             mac_address=platform.request("mac_address"),
             ip_address=platform.request("ip_address"),
             clk_freq=clk_hz,
             dw=width,
-            with_sys_datapath=fast,
+            with_ip_broadcast=False,  # else it takes packets for any address
             # the node takes a byte per cycle, which is slower than 1 Gbit/s
             rx_cdc_depth=LONGEST_FRAME * 8 // width if fast else 32,
         )
@@ -134,8 +139,6 @@ def verilog(interface: str, family: str, clk_hz: int) -> str:
     io = [*IO, CLOCKS, pads(interface)]
     if family == "ecp5":
         platform: Any = LatticePlatform("LFE5U-25F-6BG381C", io, toolchain="trellis")
-    elif family == "xc7":
-        platform = XilinxPlatform("xc7a35ticsg324-1L", io, toolchain="vivado")
     else:
         platform = GenericPlatform("simulation", io)
     core = EthernetCore(platform, interface, clk_hz)

@@ -25,7 +25,7 @@ module counter_box_bench #(
     wire [3:0] dac_cs_n, dac_sclk, dac_sdi, drive_enable;
     wire i2c_scl_low, i2c_sda_low, keyboard_clock_low, keyboard_data_low, edm_clock_low;
     wire link_tx, link_driver_enable, udp_rx_ready, udp_tx_valid, udp_tx_last;
-    wire [7:0] udp_tx_data;
+    wire [ 7:0] udp_tx_data;
     wire [47:0] udp_tx_receiver;
     wire [15:0] udp_tx_length;
     wire edm_data_low, peer_tx, display_cs_n, display_sclk, display_data;

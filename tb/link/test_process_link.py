@@ -153,6 +153,18 @@ async def a_request_is_played_and_answered_and_a_repeated_one_is_not(dut):
 
 
 @cocotb.test()
+async def a_request_that_the_carrier_calls_foreign_changes_nothing(dut):
+    node, host = await begin(dut)
+    for byte in host.request(node.levels["now"] + 40, [11, 22]):
+        await node.clk(rx_valid=1, rx_data=byte)
+    await node.clk(rx_ends=1, rx_foreign=1)
+    for _ in range(50):
+        await node.clk()
+    assert not node.registers and len(node.replies) == 1
+    assert node.receiver.counts["foreign"] == 1
+
+
+@cocotb.test()
 async def a_request_that_arrives_during_an_answer_is_busy_and_changes_nothing(dut):
     node, host = await begin(dut)
     await node.send(host.request(node.levels["now"], [11, 22]))
