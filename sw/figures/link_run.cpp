@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "figures/common.h"
@@ -29,8 +30,10 @@ constexpr int GOOD_EACH = 8;               // one good packet after so many bad 
 constexpr uint64_t HOST = 0xC0A801010FA0;  // address and port of a datagram
 
 // The carrier of a Verilated top: a datagram ends with its last byte, and has a sender.
+template <class Pins, class = void>
+constexpr bool DATAGRAMS = false;
 template <class Pins>
-constexpr bool DATAGRAMS = requires(Pins pins) { pins.rx_last; };
+constexpr bool DATAGRAMS<Pins, std::void_t<decltype(Pins::rx_last)>> = true;
 
 template <class Pins>
 void set_end(Pins& pins, bool last, uint64_t sender) {
