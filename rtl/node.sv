@@ -49,6 +49,7 @@ module node #(
     parameter int HAS_STATUS_INPUTS = 0,  // 1: build the status inputs
     parameter int SCOPE_WORDS = 0,  // words of the recorder of ticks; 0: none, and no excitation
     parameter int HAS_LINK = 0,  // 1: build the real-time link
+    parameter int LINK_UDP = 0,  // carrier of the link, 0: serial line, 1: UDP datagrams
     parameter int HAS_SERIAL_CORE = 0,  // 1: bit-serial soft core, with its firmware in a flash
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
     parameter FIRMWARE = "",  // file of its contents at power-up
@@ -69,6 +70,19 @@ module node #(
     input  wire               link_rx,              // pin, idles high
     output logic              link_tx,              // pin, idles high
     output logic              link_driver_enable,   // pin, 1: drive the line
+    // UDP datagrams of the real-time link, from and to an Ethernet core with the same clock
+    input  wire               udp_rx_valid,         // level, synchronous to clk: a byte
+    input  wire  [       7:0] udp_rx_data,          // byte, synchronous to clk
+    input  wire               udp_rx_last,          // level, synchronous to clk: the last byte
+    input  wire               udp_rx_error,         // level, synchronous to clk: it is damaged
+    input  wire  [      47:0] udp_rx_sender,        // IP address and port, synchronous to clk
+    output logic              udp_rx_ready,         // level: with udp_rx_valid, the byte is taken
+    output logic              udp_tx_valid,         // level: a byte
+    output logic [       7:0] udp_tx_data,          // byte
+    output logic              udp_tx_last,          // level: with udp_tx_valid, the last byte
+    output logic [      47:0] udp_tx_receiver,      // IP address, UDP port in bits 15:0
+    output logic [      15:0] udp_tx_length,        // bytes of the datagram
+    input  wire               udp_tx_ready,         // level, synchronous to clk: the byte is taken
     // flash of a serial core
     output logic              flash_cs_n,           // pin, low during a command
     output logic              flash_sclk,           // pin, idles low
@@ -621,7 +635,8 @@ module node #(
 
     link_port #(
         .CLK_HZ(CLK_HZ),
-        .BUILT (HAS_LINK)
+        .BUILT (HAS_LINK),
+        .UDP   (LINK_UDP)
     ) u_link (
         .clk,
         .rst,
@@ -641,11 +656,25 @@ module node #(
         .link_rdata      (rdata),
         // node
         .now             (now[31:0]),
+        .drive_on        (|drive_enable),
         .watchdog_expired(link_expired),
-        // pins
+        // pins of the serial line
         .link_rx,
         .link_tx,
-        .link_driver_enable
+        .link_driver_enable,
+        // UDP datagrams
+        .udp_rx_valid,
+        .udp_rx_data,
+        .udp_rx_last,
+        .udp_rx_error,
+        .udp_rx_sender,
+        .udp_rx_ready,
+        .udp_tx_valid,
+        .udp_tx_data,
+        .udp_tx_last,
+        .udp_tx_receiver,
+        .udp_tx_length,
+        .udp_tx_ready
     );
     if (HAS_LINK != 0) begin : g_master
         assign master_request[1] = link_request;

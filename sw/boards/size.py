@@ -22,11 +22,13 @@ FEATURES = {
 }
 STEPPER = 730  # in an axis that has another drive
 PERIPHERALS = 3033  # all six (docs/peripherals.md); one alone was not measured
+ETHERNET = 4837 + MEASURED["link_lut"]  # core of LiteEth for RGMII, as synthesised, and the link
 # Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of ten nodes)
 MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
 SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
+ETHERNET_RAM = 4  # core of LiteEth for RGMII and the link
 SCOPE_STEP_WORDS, WAVEFORM = 512, 4  # recorder of ticks: words of a block; its excitation
 # On an iCE40: the node of four axes that count in logic cells, the LUT4 by which netlists of four
 # and three of them differ, and the queue of an axis' captures
@@ -73,6 +75,7 @@ def ecp5_block_ram(machine: Machine) -> int:
     found += own + -(-(count("harmonics") - own) // HARMONICS_AXES)
     if count("velocity"):
         found += MICROCODE + ENGINE * -(-len(axes) // ENGINE_AXES)
+    found += ETHERNET_RAM * bool(machine.ip_address)
     if machine.scope_words:
         found += -(-machine.scope_words // SCOPE_STEP_WORDS) + WAVEFORM
     return found
@@ -94,7 +97,7 @@ def estimate(family: str, machine: Machine) -> Size:
     block_ram = ecp5_block_ram(machine)
     if family == "xc7":  # twice as large
         block_ram = -(-block_ram // 2)
-    shared += PERIPHERALS * bool(machine.peripherals)
+    shared += PERIPHERALS * bool(machine.peripherals) + ETHERNET * bool(machine.ip_address)
     return Size(shared + sum(map(axis_lut, axes)), block_ram)
 
 
