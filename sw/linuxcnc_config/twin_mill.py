@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mill of constraints/machines/mill.toml as a twin: three steppers and 1 um scales on one node,
+"""The mill of constraints/machines/mill_linuxcnc.toml as a twin: three steppers and 1 um scales on one node,
 RTL and firmware, in lockstep with LinuxCNC: each packet is a servo period of the machine's time.
 """
 
@@ -63,7 +63,7 @@ class TwinMill:
 
     def configuration(self) -> Configuration:
         """That of LinuxCNC for this twin."""
-        found = load("mill")
+        found = load("mill_linuxcnc")
         behind_ms = DELAY_MS + 2e3 * PERIOD_S
         axes = [
             replace(axis, following=axis.velocity * behind_ms * 2e-3)

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xD40D10C0u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x381AED28u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -472,7 +472,7 @@ enum bus_operation {
     // of signal_fault)
     BUS_OPERATION_SIGNAL = 18,
     // one word of the register map: only index, capture and compare of the feedback channels, and
-    // in the image `stream` the set-points and requests of a host
+    // in images that play streams the set-points and requests of a host
     BUS_OPERATION_WRITE_REGISTER = 19,
     BUS_OPERATION_PREPARE = 20,    // plan a motion to a position, and wait for start
     // start the prepared motions of these axes (bit n: axis n) in the same tick; none starts if one

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xD40D10C0
+PROTOCOL_CRC = 0x381AED28
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -426,7 +426,7 @@ OPERATIONS = {operation.name: operation for operation in (
               (("faults", "u16"), ("first", "u16"),)),
     Operation("write_register", 19,
               "one word of the register map: only index, capture and compare of the feedback "
-              "channels, and in the image `stream` the set-points and requests of a host",
+              "channels, and in images that play streams the set-points and requests of a host",
               (("address", "u16"), ("value", "u32"),),
               ()),
     Operation("prepare", 20, "plan a motion to a position, and wait for start",
