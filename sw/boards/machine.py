@@ -51,6 +51,7 @@ FEATURES = {  # of an axis: its parameter of rtl/node.sv, and the feature that i
     "filters": ("HAS_FILTERS", "drive"),
     "fine_stage": ("HAS_FINE_STAGE", "dac"),
     "set_points": ("HAS_SET_POINTS", "drive"),
+    "backlash": ("HAS_BACKLASH", "drive"),
 }
 AXIS_SIGNALS = {
     "encoder_a": Signal("in", "encoder", "A of the scale"),

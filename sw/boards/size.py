@@ -19,6 +19,7 @@ FEATURES = {
     "capture": 280,
     "encoder_check": 190,
     "recorder": 100,
+    "backlash": 638,
 }
 STEPPER = 730  # in an axis that has another drive
 PERIPHERALS = 3033  # all six (docs/peripherals.md); one alone was not measured
