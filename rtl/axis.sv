@@ -35,7 +35,8 @@ module axis #(
     parameter int HAS_STEPPER = HAS_DRIVE,  // 1: build the step generator
     parameter int HAS_DAC = HAS_DRIVE,  // 1: build the DAC
     parameter int HAS_FINE_STAGE = HAS_DAC,  // 1: build the fine stage; needs the DAC
-    parameter int HAS_SET_POINTS = 0  // 1: set_point_player of the node serves the axis
+    parameter int HAS_SET_POINTS = 0,  // 1: set_point_player of the node serves the axis
+    parameter int HAS_BACKLASH = 0  // 1: build the compensation of backlash
 ) (
     input wire clk,
     input wire rst,
@@ -74,6 +75,7 @@ module axis #(
     output logic block_up,  // level: no positive command passes
     output logic block_down,  // level: no negative command passes
     output logic closed_loop,  // level: the servo commands the drive
+    output logic [23:0] take_up,  // 2^-16 period, by which the motor is before the table
     output logic play,  // strobe: play the queued segments
     output logic arm,  // strobe: play them at start_at
     output logic controlled_stop,  // strobe: stop, and empty the queue
@@ -158,6 +160,9 @@ module axis #(
     if (HAS_DRIVE == 0 && HAS_SET_POINTS != 0) begin : g_check_set_points
         SET_POINTS_NEED_HAS_DRIVE u_error ();
     end
+    if (HAS_DRIVE == 0 && HAS_BACKLASH != 0) begin : g_check_backlash
+        BACKLASH_NEEDS_HAS_DRIVE u_error ();
+    end
 
     // requests
     wire [1:0] control_enable, control_homing;  // each holds if both of its bits are 1
@@ -222,7 +227,8 @@ module axis #(
         .HAS_RECORDER     (HAS_RECORDER),
         .HAS_CAPTURE      (HAS_CAPTURE),
         .HAS_COMPARE      (HAS_COMPARE),
-        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK)
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_BACKLASH     (HAS_BACKLASH)
     ) u_feedback (
         .clk,
         .rst,
@@ -260,6 +266,11 @@ module axis #(
         // own steps
         .own_step     (step),
         .own_downward (downward),
+        // backlash
+        .result_valid,
+        .result_kind,
+        .result,
+        .take_up,
         // shared chain
         .chain_setting_written,
         .chain_harmonic_enable,
@@ -517,6 +528,7 @@ module axis #(
         .built_filters                 (3'(FILTERS)),
         .built_segments                (8'(SEGMENTS)),
         .built_set_points              (1'(HAS_SET_POINTS)),
+        .built_backlash                (1'(HAS_BACKLASH)),
         // interlock
         .faults,
         .causes_now,

@@ -41,6 +41,7 @@ module node #(
     parameter int HAS_DAC = HAS_DRIVE,  // axes with a DAC, needs the drive
     parameter int HAS_FINE_STAGE = HAS_DAC,  // axes with a fine stage, needs the DAC
     parameter int HAS_SET_POINTS = 0,  // axes that can follow streamed set-points, needs the drive
+    parameter int HAS_BACKLASH = 0,  // axes with compensation of backlash, needs the drive
     parameter int HAS_I2C = 0,  // 1: build the I2C master
     parameter int HAS_PS2 = 0,  // 1: build the PS/2 pass-through
     parameter int HAS_PEER = 0,  // 1: build the peer port
@@ -171,6 +172,7 @@ module node #(
     wire [AXES-1:0] start;
     // motion engine
     wire [48*AXES-1:0] position, moved_by;
+    wire [24*AXES-1:0] take_up;
     wire [AXES-1:0] step_made, step_down, moves, moved, block_up, block_down, closed_loop;
     wire [AXES-1:0] play, arm, controlled_stop, hold_target, request_waits, pending;
     wire result_valid, result_flag, servo_overrun;
@@ -477,6 +479,7 @@ module node #(
         .block_up,
         .block_down,
         .closed_loop,
+        .take_up,
         .enabled    (drive_enable),
         // requests
         .play,
@@ -794,7 +797,8 @@ module node #(
             .HAS_STEPPER      (HAS_STEPPER >> n & 1),
             .HAS_DAC          (HAS_DAC >> n & 1),
             .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1),
-            .HAS_SET_POINTS   (HAS_SET_POINTS >> n & 1)
+            .HAS_SET_POINTS   (HAS_SET_POINTS >> n & 1),
+            .HAS_BACKLASH     (HAS_BACKLASH >> n & 1)
         ) u_axis (
             .clk,
             .rst,
@@ -833,6 +837,7 @@ module node #(
             .block_up             (block_up[n]),
             .block_down           (block_down[n]),
             .closed_loop          (closed_loop[n]),
+            .take_up              (take_up[24*n+:24]),
             .play                 (play[n]),
             .arm                  (arm[n]),
             .controlled_stop      (controlled_stop[n]),

@@ -51,6 +51,8 @@ FEATURES = {  # of an axis: its parameter of rtl/node.sv, and the feature that i
     "velocity": ("HAS_VELOCITY", ""),
     "filters": ("HAS_FILTERS", "drive"),
     "fine_stage": ("HAS_FINE_STAGE", "dac"),
+    "set_points": ("HAS_SET_POINTS", "drive"),
+    "backlash": ("HAS_BACKLASH", "drive"),
 }
 AXIS_SIGNALS = {
     "encoder_a": Signal("in", "encoder", "A of the scale"),
@@ -111,6 +113,7 @@ SIGNALS = AXIS_SIGNALS | NODE_SIGNALS | RELAY_SIGNALS
 GROUPS = sorted({signal.group for signal in SIGNALS.values()})
 SCOPE_WORDS = [1 << n for n in range(8, 17)]  # of the recorder of ticks
 SCOPE_IMAGES = ("axis", "stream")  # whose firmware has its requests
+STREAM_IMAGES = ("stream", "steps_stream")  # whose firmware supervises set-points
 LOCAL_MAC = 0x024D  # the first two bytes of MAC addresses that we choose ourselves
 MOST_ORDERS = 16  # of a relay whose timing and size are known
 
@@ -349,6 +352,12 @@ def check(machine: Machine) -> None:
         raise Misfit(
             f"{file}: [node] scope_words needs image {' or '.join(SCOPE_IMAGES)}: "
             f"{machine.image} does not record ticks"
+        )
+    followers = [axis.name for axis in machine.axes if "set_points" in axis.features]
+    if followers and machine.image not in STREAM_IMAGES:
+        raise Misfit(
+            f"{file}: the feature set_points of axis {followers[0]} needs image "
+            f"{' or '.join(STREAM_IMAGES)}: {machine.image} does not play streams"
         )
 
 

@@ -501,9 +501,13 @@ def test_the_costs_of_features_are_those_that_the_page_lists():
     )
     words = {"segments": "segment table", "monitor": "signal monitor", "fine_stage": "fine stage"}
     words |= {"capture": "capture queue", "encoder_check": "check of the encoder"}
+    words |= {"backlash": "compensation of backlash"}
     for name, lut in size.FEATURES.items():
         assert int(rows[words.get(name, name)]) == lut, name
     assert int(rows["step generator"]) == size.STEPPER
+    assert int(rows["real-time link"]) == size.LINK
+    assert int(rows["set-points of one axis"]) == size.SET_POINTS
+    assert int(rows["set-points of each further axis"]) == size.SET_POINTS_AXIS
     assert f"take {size.PERIPHERALS} LUT4" in (ROOT / "docs" / "peripherals.md").read_text()
     assert str(size.STEP_NODE) in rows.values() and str(size.SINE_NODE) in rows.values()
     assert str(size.STEP_AXIS) in rows.values() and str(size.SINE_AXIS) in rows.values()
@@ -521,6 +525,25 @@ def test_the_block_rams_are_those_of_netlists(tmp_path):
         "constraints/machines/s0.toml: 1 axis with 96 KiB need about 57 block RAM, but "
         "LFE5U-25F-6BG381C of constraints/ulx3s_25f/board.toml has 56"
     ]
+
+
+def test_a_node_with_set_points_and_the_real_time_link_has_their_size():
+    """Three axes, synthesised: 13 996 LUT4 with the set-points, 9464 without."""
+    plain, stream = (
+        size.estimate("ecp5", machine.named(name)) for name in ("mill", "mill_linuxcnc")
+    )
+    more = size.LINK + 3 * size.FEATURES["backlash"]
+    assert stream.lut - plain.lut - more == 13_996 - 9464 + 1
+    assert stream.block_ram == plain.block_ram
+
+
+def test_a_part_that_is_too_small_for_set_points_is_refused(tmp_path):
+    needed = size.estimate("ecp5", machine.named("mill_linuxcnc")).lut
+    change = ("lut = 24288", f"lut = {needed - 1}")
+    path = edited(tmp_path, "constraints/colorlight_i5/board.toml", change)
+    assert fit(board.load(path), machine.named("mill"))
+    found = refusal(lambda: fit(board.load(path), machine.named("mill_linuxcnc")))
+    assert f"3 axes with 64 KiB need about {needed} LUT, but" in found
 
 
 # Pins of others
@@ -762,6 +785,11 @@ def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
             'name = "Y"',
             'name = "Y"\nfeatures = ["lasers"]',
             "[axis 2] features: 'lasers' is none of sine, ",
+        ),
+        (
+            'name = "Y"',
+            'name = "Y"\nfeatures = ["set_points"]',
+            "the feature set_points of axis Y needs image stream or steps_stream: steps does not",
         ),
         ("[between.estop]", "[between.stop]", "[between] stop is none of adc, bridge, "),
         (

@@ -484,7 +484,7 @@ enum bus_operation {
     // of signal_fault)
     BUS_OPERATION_SIGNAL = 18,
     // one word of the register map: only index, capture and compare of the feedback channels, and
-    // in the image `stream` the set-points and requests of a host
+    // in images that play streams the set-points and requests of a host
     BUS_OPERATION_WRITE_REGISTER = 19,
     BUS_OPERATION_PREPARE = 20,    // plan a motion to a position, and wait for start
     // start the prepared motions of these axes (bit n: axis n) in the same tick; none starts if one

@@ -1137,6 +1137,10 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_BUILT_SET_POINTS_MASK 0x01000000u
 #define AXIS_BUILT_SET_POINTS_SHIFT 24
 #define AXIS_BUILT_SET_POINTS_WIDTH 1
+// HAS_BACKLASH: compensation of backlash
+#define AXIS_BUILT_BACKLASH_MASK 0x02000000u
+#define AXIS_BUILT_BACKLASH_SHIFT 25
+#define AXIS_BUILT_BACKLASH_WIDTH 1
 // rw: largest |integral term|; full scale 2^15
 #define AXIS_INTEGRAL_LIMIT 0x070u
 #define AXIS_INTEGRAL_LIMIT_MASK 0x00007fffu
@@ -1709,6 +1713,27 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_SEGMENT_ERROR_MASK 0x00ffffffu
 #define FEEDBACK_SEGMENT_ERROR_SHIFT 0
 #define FEEDBACK_SEGMENT_ERROR_WIDTH 24
+// rw: backlash between motor and table: how far the motor turns after a reversal until the table
+// moves [1/65536 period]
+#define FEEDBACK_BACKLASH 0x0d8u
+#define FEEDBACK_BACKLASH_MASK 0x00ffffffu
+#define FEEDBACK_BACKLASH_SHIFT 0
+#define FEEDBACK_BACKLASH_WIDTH 24
+// rw: how the backlash is taken up
+#define FEEDBACK_BACKLASH_RATE 0x0dcu
+// velocity of the motor beyond that of the target; 0: at once [1/65536 period/tick]
+#define FEEDBACK_BACKLASH_RATE_MASK 0x00ffffffu
+#define FEEDBACK_BACKLASH_RATE_SHIFT 0
+#define FEEDBACK_BACKLASH_RATE_WIDTH 24
+// how far the target must move back until that is a reversal [1/256 period]
+#define FEEDBACK_BACKLASH_RATE_HYSTERESIS_MASK 0x7f000000u
+#define FEEDBACK_BACKLASH_RATE_HYSTERESIS_SHIFT 24
+#define FEEDBACK_BACKLASH_RATE_HYSTERESIS_WIDTH 7
+// 1: the sensor is on the motor's side, and the position of the axis is that of the table; 0: it is
+// on the table
+#define FEEDBACK_BACKLASH_RATE_MOTOR_SIDE_MASK 0x80000000u
+#define FEEDBACK_BACKLASH_RATE_MOTOR_SIDE_SHIFT 31
+#define FEEDBACK_BACKLASH_RATE_MOTOR_SIDE_WIDTH 1
 
 // actuator: bridge, stepper driver or DAC, and the fine stage
 // rw: kind of drive: 0 bridge, 1 stepper, 2 DAC

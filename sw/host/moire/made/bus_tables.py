@@ -439,7 +439,7 @@ OPERATIONS = {operation.name: operation for operation in (
               (("faults", "u16"), ("first", "u16"),)),
     Operation("write_register", 19,
               "one word of the register map: only index, capture and compare of the feedback "
-              "channels, and in the image `stream` the set-points and requests of a host",
+              "channels, and in images that play streams the set-points and requests of a host",
               (("address", "u16"), ("value", "u32"),),
               ()),
     Operation("prepare", 20, "plan a motion to a position, and wait for start",

@@ -1405,6 +1405,12 @@ FIELDS = (
         "HAS_SET_POINTS: player of streamed set-points",
     ),
     Field(
+        "axis", "built", "backlash",
+        0x6C, 25, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_BACKLASH: compensation of backlash",
+    ),
+    Field(
         "axis", "integral_limit", "value",
         0x70, 0, 15, False, "rw", "",
         Fraction(1, 1),
@@ -2137,6 +2143,32 @@ FIELDS = (
         0xD4, 0, 24, True, "r", "period",
         Fraction(1, 65536),
         "error subtracted from the position now",
+    ),
+    Field(
+        "feedback", "backlash", "value",
+        0xD8, 0, 24, False, "rw", "period",
+        Fraction(1, 65536),
+        "backlash between motor and table: how far the motor turns after a reversal until the "
+        "table moves",
+    ),
+    Field(
+        "feedback", "backlash_rate", "value",
+        0xDC, 0, 24, False, "rw", "period/tick",
+        Fraction(1, 65536),
+        "velocity of the motor beyond that of the target; 0: at once",
+    ),
+    Field(
+        "feedback", "backlash_rate", "hysteresis",
+        0xDC, 24, 7, False, "rw", "period",
+        Fraction(1, 256),
+        "how far the target must move back until that is a reversal",
+    ),
+    Field(
+        "feedback", "backlash_rate", "motor_side",
+        0xDC, 31, 1, False, "rw", "",
+        Fraction(1, 1),
+        "1: the sensor is on the motor's side, and the position of the axis is that of the "
+        "table; 0: it is on the table",
     ),
     Field(
         "actuator", "drive", "value",
