@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x5D4EA982
+PROTOCOL_CRC = 0xFF461A1E
 VERSION = 1
 LONGEST_BODY = 64
 
