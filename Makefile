@@ -139,11 +139,12 @@ $(DOCS): tools/docs.lock | $(SETUP)
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
 	@touch $@
 
-litex: $(LITEX)   ## LiteX into build/litex, for sw/embed/litex_soc.py and its test; docs/embedding.md
+litex: $(LITEX)   ## LiteX and LiteEth into build/litex, for sw/embed/litex_soc.py and the link over Ethernet; docs/embedding.md, docs/link.md
 
-$(LITEX): sw/embed/litex.lock | $(SETUP)
+$(LITEX): sw/embed/litex.lock tools/scapy.lock | $(SETUP)
 	@rm -rf $(@D)
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps -r tools/scapy.lock
 	@touch $@
 
 chromium: $(SETUP) ## Chromium by apt-get, and Playwright, which drives it in the tests of the live page; docs/page.md
