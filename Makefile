@@ -152,11 +152,12 @@ sigrok:           ## sigrok-cli by apt-get, for the figure ps2_bytes_wrong and t
 		apt-get -qy install --no-install-recommends sigrok-cli; } > build/sigrok.log 2>&1 < /dev/null \
 		|| { echo "apt-get could not install sigrok-cli, see build/sigrok.log: install it and run this again" >&2; false; }
 
-litex: $(LITEX)   ## LiteX into build/litex, for sw/embed/litex_soc.py and its test; docs/embedding.md
+litex: $(LITEX)   ## LiteX and LiteEth into build/litex, for sw/embed/litex_soc.py and the link over Ethernet; docs/embedding.md, docs/link.md
 
-$(LITEX): sw/embed/litex.lock | $(SETUP)
+$(LITEX): sw/embed/litex.lock tools/scapy.lock | $(SETUP)
 	@rm -rf $(@D)
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps -r tools/scapy.lock
 	@touch $@
 
 chromium: $(SETUP) ## Chromium by apt-get, and Playwright, which drives it in the tests of the live page; docs/page.md

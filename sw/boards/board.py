@@ -45,6 +45,7 @@ class Pad:
     pull: str = "none"
     through: str = ""  # a buffer in between
     pulled_up: bool = False  # by the board, also before the configuration
+    fast: bool = False  # of an output: strong and fast edges
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ def ethernet_of(table: Table) -> Ethernet | None:
             raise table.misfit(f"{name} must name {count} pin{'s' * (count > 1)}")
         numbered = [f"eth_{name}" + (f"_{n}" if count > 1 else "") for n in range(count)]
         pads |= {
-            port: Pad(ball, f"PHY {name}", direction)
+            port: Pad(ball, f"PHY {name}", direction, fast=True)
             for port, ball in zip(numbered, balls, strict=True)
         }
         inside = {"rx_clk": "clocks_rx", "tx_clk": "clocks_tx"}.get(name, f"pads_{name}")

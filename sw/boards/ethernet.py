@@ -11,7 +11,8 @@ from pathlib import Path
 
 from boards.toml_file import Misfit
 from embed.design import FOREIGN_STYLE
-from embed.litex_parts import FOLDER, is_there
+from embed.litex_parts import FOLDER, has_ethernet
+from moire.made import link_tables
 from twin import build
 from twin.build import ROOT
 
@@ -23,9 +24,10 @@ def core(interface: str, family: str, clk_hz: int) -> Path:
     """The Verilog of the core, made once: an interface of the board, the family of the part (or
     `simulation`) and the clock of the node. A Misfit says what is missing.
     """
-    if not is_there():
+    if not has_ethernet():
         raise Misfit("the Ethernet core is made by LiteEth, which is not set up: make litex")
-    sources = [MAKER, Path(__file__), FOLDER / "stamp", ROOT / "sw" / "embed" / "litex.lock"]
+    sources = [MAKER, Path(__file__), ROOT / "sw" / "embed" / "litex.lock"]
+    sources.append(Path(link_tables.__file__))
     name = build.digest(sources, interface, family, clk_hz)
 
     def make(folder: Path) -> None:

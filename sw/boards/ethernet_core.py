@@ -5,9 +5,9 @@ link of rtl/node.sv.
     PYTHONPATH=build/litex python -m boards.ethernet_core INTERFACE FAMILY CLK_HZ FILE
 
 INTERFACE to the PHY: mii (100 Mbit/s), rgmii (1 Gbit/s), or wide_mii, which is mii with the data
-path of rgmii. FAMILY: ecp5 or simulation. The
-file is Verilog with one module, `ethernet_core`; its port `udp` has the signals of the node's port
-as seen from the node. `boards.ethernet` runs this; `make litex` fetches LiteX and LiteEth.
+path of rgmii. FAMILY: ecp5 or simulation. The file is Verilog with one module, `ethernet_core`; its
+port `udp` has the signals of the node's port as seen from the node. `boards.ethernet` runs this;
+`make litex` fetches LiteX and LiteEth.
 """
 
 import sys
@@ -81,7 +81,7 @@ class EthernetCore(LiteXModule):
         self.comb += self.phy.crg._reset.storage.eq(self.cd_sys.rst)
         width = WIDTHS[interface]
         fast = width > 8
-        # else the check of the FCS never fails
+        # without it the check of the FCS never fails
         self.comb += self.phy.source.last_be.eq(self.phy.source.last)
         self.core = LiteEthUDPIPCore(
             self.phy,

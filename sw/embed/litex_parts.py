@@ -10,3 +10,8 @@ NAME = "motion_soc"  # of the example and of its files
 def is_there() -> bool:
     """Whether LiteX is set up."""
     return (FOLDER / "stamp").exists()
+
+
+def has_ethernet() -> bool:
+    """Whether LiteEth is set up with it."""
+    return is_there() and (FOLDER / "liteeth").exists()

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import cast
 
-from embed.litex_parts import is_there
+from embed.litex_parts import has_ethernet
 from figures.common import Absent, Figure, Quick, bar, console, shares
 from figures.ethernet import BYTE_S, GAP_BYTES, EthernetHost, EthernetNode, frame_bytes
 from figures.ethernet import CLK_HZ as ETHERNET_CLK_HZ
@@ -112,8 +112,8 @@ def ethernet_times(cycles: int, axes: int) -> tuple[float, float]:
     the next one, and from the last nibble of a request to the first one of its reply. Meanwhile the
     soft core does nothing but read registers, one after the other.
     """
-    if not is_there():
-        raise Absent("LiteX, which makes the Ethernet core, is not set up: make litex")
+    if not has_ethernet():
+        raise Absent("LiteEth, which makes the Ethernet core, is not set up: make litex")
     node = EthernetNode(axes)
     host = EthernetHost(node)
     link = DATA.set_up(cast(ClientNode, node), watchdog_s=0)

@@ -303,6 +303,10 @@ def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(tmp_path):
         in (made["top.sv"])
     )
     assert 'FREQUENCY PORT "eth_rx_clk" 125.0 MHZ;' in made["pins.lpf"]
+    assert (
+        'IOBUF PORT "eth_tx_clk" PULLMODE=NONE IO_TYPE=LVCMOS33 DRIVE=8 SLEWRATE=FAST;'
+        in (made["pins.lpf"])
+    )
     for port, ball in (("eth_rx_clk", "H2"), ("eth_tx_ctl", "K1"), ("eth_tx_data_3", "J3")):
         assert f'LOCATE COMP "{port}" SITE "{ball}";' in made["pins.lpf"]
     plain = generate.files(fit(board.named("colorlight_i5"), machine.named("mill")))

@@ -5,26 +5,26 @@ MII pins. Without LiteX (`make litex`) the tests are skipped.
 
 import logging
 import random
-import sys
+from importlib.util import find_spec
 
 import pytest
 
 from boards import ethernet
 from boards.toml_file import Misfit
-from embed.litex_parts import FOLDER, is_there
+from embed.litex_parts import has_ethernet
 from figures.ethernet import CLK_HZ, SHORTER, EthernetNode
 from moire.client.link import ProcessData
 from moire.made import link_tables as layout
 from tb.bench import seed
 
-if is_there():
-    sys.path.append(str(FOLDER))
+SET_UP = has_ethernet() and find_spec("scapy") is not None
+if SET_UP:
     logging.getLogger("scapy").setLevel(logging.ERROR)
     from scapy.layers.inet import ICMP, IP, UDP
     from scapy.layers.l2 import ARP, Ether
     from scapy.packet import Raw
 
-needs_litex = pytest.mark.skipif(not is_there(), reason="LiteX is not set up: make litex")
+needs_litex = pytest.mark.skipif(not SET_UP, reason="LiteEth or scapy is not set up: make litex")
 NODE_IP, NODE_MAC = "192.168.1.50", "02:4d:c0:a8:01:32"
 HOST_PORT = 4000
 ARP_S = 1  # at least what LiteEth waits for an answer, with its repetitions
@@ -201,7 +201,13 @@ def test_a_host_that_does_not_answer_arp_stops_the_link_only_for_a_while(node):
     assert node.read_named("axis.output_limit") == {"value": 4}
 
 
+@needs_litex
+def test_a_core_that_cannot_be_made_is_refused():
+    with pytest.raises(Misfit, match="(?s)LiteEth has not made the Ethernet core: .*sgmii"):
+        ethernet.core("sgmii", "simulation", 50_000_000)
+
+
 def test_without_litex_the_core_says_what_is_missing(monkeypatch):
-    monkeypatch.setattr(ethernet, "is_there", lambda: False)
+    monkeypatch.setattr(ethernet, "has_ethernet", lambda: False)
     with pytest.raises(Misfit, match="make litex"):
         ethernet.core("mii", "simulation", 50_000_000)
