@@ -18,6 +18,7 @@ FIRMWARE := build/firmware/firmware.hex
 LITEX    := build/litex/stamp
 GOWIN    := build/gowin/stamp
 DOCS     := build/docs_tools/stamp
+COSMIC   := build/cosmic_ray/stamp
 LOADER_STAMP := build/loader/stamp
 
 say = @printf '%s\n' '--- $(1)'
@@ -139,6 +140,18 @@ $(DOCS): tools/docs.lock | $(SETUP)
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
 	@touch $@
 
+cosmicray: $(COSMIC)   ## Cosmic Ray into build/cosmic_ray, for mutants of the host's modules; docs/mutation.md
+
+$(COSMIC): sw/mutation/cosmic_ray.lock | $(SETUP)
+	@rm -rf $(@D)
+	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
+	@touch $@
+
+sigrok:           ## sigrok-cli by apt-get, for the figure ps2_bytes_wrong and the tests that let it judge waveforms
+	@command -v sigrok-cli > /dev/null || { mkdir -p build; $(AS_ROOT) apt-get -q update && $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
+		apt-get -qy install --no-install-recommends sigrok-cli; } > build/sigrok.log 2>&1 < /dev/null \
+		|| { echo "apt-get could not install sigrok-cli, see build/sigrok.log: install it and run this again" >&2; false; }
+
 litex: $(LITEX)   ## LiteX into build/litex, for sw/embed/litex_soc.py and its test; docs/embedding.md
 
 $(LITEX): sw/embed/litex.lock | $(SETUP)
@@ -193,4 +206,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board load flash docs litex gowin loader linuxcnc chromium ngspice spice clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board load flash docs litex cosmicray sigrok gowin loader linuxcnc chromium ngspice spice clean

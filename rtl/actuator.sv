@@ -16,47 +16,48 @@ module actuator #(
     parameter int HAS_DAC        = 1,  // 1: build the DAC
     parameter int HAS_FINE_STAGE = 1   // 1: build the fine stage, which needs the DAC
 ) (
-    input  wire               clk,
-    input  wire               rst,
+    input  wire                clk,
+    input  wire                rst,
     // register bus
-    input  wire               select,          // strobe: an access to this actuator
-    input  wire               write,           // level: the access writes
-    input  wire        [ 5:0] word,            // 32-bit word of the block
-    input  wire        [31:0] wdata,           // value to write
-    output logic       [31:0] rdata,           // live bits read, in the next cycle; else 0
+    input  wire                select,          // strobe: an access to this actuator
+    input  wire                write,           // level: the access writes
+    input  wire         [ 5:0] word,            // 32-bit word of the block
+    input  wire         [31:0] wdata,           // value to write
+    output logic        [31:0] rdata,           // live bits read, in the next cycle; else 0
     // permission
-    input  wire               enable,          // level: the interlock allows the drive
-    input  wire               fine,            // level: the fine stage holds the position
-    input  wire               block_up,        // level: the interlock blocks motion up
-    input  wire               block_down,      // level: the interlock blocks motion down
+    input  wire                enable,          // level: the interlock allows the drive
+    input  wire                fine,            // level: the fine stage holds the position
+    input  wire                block_up,        // level: the interlock blocks motion up
+    input  wire                block_down,      // level: the interlock blocks motion down
     // motion
-    input  wire               valid,           // strobe: command is new
-    input  wire signed [15:0] command,         // full scale 2^15
-    input  wire signed [47:0] target,          // 2^-16 period
-    input  wire               line_up,         // level: the target of the line moved up
-    input  wire               line_down,       // level: the target of the line moved down
+    input  wire                valid,           // strobe: command is new
+    input  wire signed  [15:0] command,         // full scale 2^15
+    input  wire signed  [47:0] target,          // 2^-16 period
+    input  wire                line_up,         // level: the target of the line moved up
+    input  wire                line_down,       // level: the target of the line moved down
     // lines of motor steps
-    input  wire               line_start,      // strobe: the lines begin
-    input  wire               line_idle,       // level: the lines have ended
-    input  wire               rate_valid,      // strobe: the rate of the next line is new
-    input  wire signed [36:0] rate,            // 2^-36 motor step per cycle, with rate_valid
-    input  wire               rate_restart,    // level: that line begins at a whole step
-    input  wire               rate_steep,      // level: that line is too steep
-    output logic              line_stopped,    // level: no line is followed until a restart
-    input  wire               compared,        // strobe: target of this tick is known
-    input  wire signed [47:0] position,        // 2^-16 period
+    input  wire                line_start,      // strobe: the lines begin
+    input  wire                line_idle,       // level: the lines have ended
+    input  wire                rate_valid,      // strobe: the rate of the next line is new
+    input  wire signed  [36:0] rate,            // 2^-36 motor step per cycle, with rate_valid
+    input  wire                rate_restart,    // level: that line begins at a whole step
+    input  wire                rate_steep,      // level: that line is too steep
+    output logic               line_stopped,    // level: no line is followed until a restart
+    input  wire                compared,        // strobe: target of this tick is known
+    input  wire signed  [47:0] position,        // 2^-16 period
     // pins
-    output logic              bridge_a,        // pin, alone high for a positive command
-    output logic              bridge_b,        // pin, alone high for a negative command
-    output logic              step,            // pin, as step_output_mode says
-    output logic              direction,       // pin, as step_output_mode says
-    output logic              dac_cs_n,        // pin, low during a word
-    output logic              dac_sclk,        // pin, idles low
-    output logic              dac_sdi,         // pin, data of the DAC
+    output logic               bridge_a,        // pin, alone high for a positive command
+    output logic               bridge_b,        // pin, alone high for a negative command
+    output logic               step,            // pin, as step_output_mode says
+    output logic               direction,       // pin, as step_output_mode says
+    output logic               dac_cs_n,        // pin, low during a word
+    output logic               dac_sclk,        // pin, idles low
+    output logic               dac_sdi,         // pin, data of the DAC
     // state
-    output logic              downward,        // level: the next step goes down
-    output logic              fine_saturated,  // level: the fine stage is at its limit
-    output logic              step_overrun     // level: too many steps are overdue
+    output logic               downward,        // level: the next step goes down
+    output logic signed [15:0] fine_command,    // of the fine stage, full scale 2^15
+    output logic               fine_saturated,  // level: the fine stage is at its limit
+    output logic               step_overrun     // level: too many steps are overdue
 );
     if (HAS_BRIDGE + HAS_STEPPER + HAS_DAC == 0) begin : g_check_drives
         AN_ACTUATOR_NEEDS_A_DRIVE u_error ();
@@ -84,7 +85,6 @@ module actuator #(
     wire [23:0] fine_kp, fine_ki, fine_kd;
     wire [14:0] fine_limit;
     wire fine_kp_written, fine_valid;
-    wire signed [15:0] fine_command;
 
     drive_select u_select (
         // permission

@@ -35,7 +35,8 @@ module axis #(
     parameter int HAS_STEPPER = HAS_DRIVE,  // 1: build the step generator
     parameter int HAS_DAC = HAS_DRIVE,  // 1: build the DAC
     parameter int HAS_FINE_STAGE = HAS_DAC,  // 1: build the fine stage; needs the DAC
-    parameter int HAS_SET_POINTS = 0  // 1: set_point_player of the node serves the axis
+    parameter int HAS_SET_POINTS = 0,  // 1: set_point_player of the node serves the axis
+    parameter int HAS_BACKLASH = 0  // 1: build the compensation of backlash
 ) (
     input wire clk,
     input wire rst,
@@ -74,6 +75,7 @@ module axis #(
     output logic block_up,  // level: no positive command passes
     output logic block_down,  // level: no negative command passes
     output logic closed_loop,  // level: the servo commands the drive
+    output logic [23:0] take_up,  // 2^-16 period, by which the motor is before the table
     output logic play,  // strobe: play the queued segments
     output logic arm,  // strobe: play them at start_at
     output logic controlled_stop,  // strobe: stop, and empty the queue
@@ -127,6 +129,11 @@ module axis #(
     input wire chain_overspeed,  // strobe: the speed is too high
     input wire chain_disagreement,  // level: position and count differ
     input wire chain_lost,  // strobe: a sample of this axis was lost
+    // to a recorder
+    output logic signed [47:0] target,  // 2^-16 period, held
+    output logic [15:0] phase,  // 2^-16 period, corrected
+    output logic signed [15:0] fine_command,  // of the fine stage, full scale 2^15
+    output logic [12:0] faults,  // latched; bits as in axis_registers.faults
     // pins of the machine
     input wire limit_low_open,  // pin, 1: pressed or wire cut
     input wire limit_high_open,  // pin, 1: pressed or wire cut
@@ -153,6 +160,9 @@ module axis #(
     if (HAS_DRIVE == 0 && HAS_SET_POINTS != 0) begin : g_check_set_points
         SET_POINTS_NEED_HAS_DRIVE u_error ();
     end
+    if (HAS_DRIVE == 0 && HAS_BACKLASH != 0) begin : g_check_backlash
+        BACKLASH_NEEDS_HAS_DRIVE u_error ();
+    end
 
     // requests
     wire [1:0] control_enable, control_homing;  // each holds if both of its bits are 1
@@ -171,18 +181,17 @@ module axis #(
     wire [1:0] probe_level;
     // measuring path
     wire signed [W-1:0] sin, cos;
-    wire [15:0] phase, amplitude;
-    wire [5:0] encoder_events;
+    wire [15:0] amplitude;
+    wire [ 5:0] encoder_events;
     wire sample_rejected, pulse_rejected, encoder_fault, position_valid, zero_up, zero_down;
     // target and command
-    wire signed [47:0] target;
     wire signed [31:0] velocity, error;
     wire signed [15:0] command, servo_command;
     wire [4:0] queue_free;
     wire moving, armed, saturated, line_up, line_down, underrun;
     wire compared, too_far, commanded;
     // interlock and drive
-    wire [12:0] faults, causes_now, first_fault;
+    wire [12:0] causes_now, first_fault;
     wire signed [47:0] fault_position;
     wire downward, fine_saturated;
 
@@ -218,7 +227,8 @@ module axis #(
         .HAS_RECORDER     (HAS_RECORDER),
         .HAS_CAPTURE      (HAS_CAPTURE),
         .HAS_COMPARE      (HAS_COMPARE),
-        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK)
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_BACKLASH     (HAS_BACKLASH)
     ) u_feedback (
         .clk,
         .rst,
@@ -256,6 +266,11 @@ module axis #(
         // own steps
         .own_step     (step),
         .own_downward (downward),
+        // backlash
+        .result_valid,
+        .result_kind,
+        .result,
+        .take_up,
         // shared chain
         .chain_setting_written,
         .chain_harmonic_enable,
@@ -433,6 +448,7 @@ module axis #(
             .dac_sdi,
             // state
             .downward,
+            .fine_command,
             .fine_saturated,
             .step_overrun
         );
@@ -442,7 +458,7 @@ module axis #(
         assign {drive_enable, faults, causes_now, first_fault, fault_position} = '0;
         assign {bridge_a, bridge_b, step, direction} = '0;
         assign {dac_cs_n, dac_sclk, dac_sdi} = 3'b100;
-        assign {actuator_rdata, downward, fine_saturated} = '0;
+        assign {actuator_rdata, downward, fine_command, fine_saturated} = '0;
         assign line_stopped = 1'b1;
 
         wire unused_bus = &{1'b0, actuator_select, start};
@@ -512,6 +528,7 @@ module axis #(
         .built_filters                 (3'(FILTERS)),
         .built_segments                (8'(SEGMENTS)),
         .built_set_points              (1'(HAS_SET_POINTS)),
+        .built_backlash                (1'(HAS_BACKLASH)),
         // interlock
         .faults,
         .causes_now,

@@ -25,7 +25,8 @@ module feedback_channel #(
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder, likewise
     parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
     parameter int HAS_COMPARE = 1,  // 1: build compare
-    parameter int HAS_ENCODER_CHECK = 1  // 1: build the check of the encoder
+    parameter int HAS_ENCODER_CHECK = 1,  // 1: build the check of the encoder
+    parameter int HAS_BACKLASH = 0  // 1: build the compensation of backlash
 ) (
     input wire clk,
     input wire rst,
@@ -64,6 +65,11 @@ module feedback_channel #(
     // the axis' own steps
     input wire own_step,  // level of the step output
     input wire own_downward,  // level: the next own step goes down
+    // backlash
+    input wire result_valid,  // strobe: a result of motion_engine is new, and of this axis
+    input wire [2:0] result_kind,  // number of what it is
+    input wire [47:0] result,  // value, signed
+    output logic [23:0] take_up,  // 2^-16 period, by which the motor is before the table
     // to a shared chain, as its ports of this axis
     output logic [7:0] chain_setting_written,  // strobes of its settings
     output logic chain_harmonic_enable,  // level: correct the harmonics
@@ -97,13 +103,15 @@ module feedback_channel #(
     output logic encoder_fault,  // level: an enabled event or signal fault
     // position
     output logic position_valid,  // strobe: position is new
-    output logic signed [47:0] position,  // 2^-16 period, less the segment error
+    output logic signed [47:0] position,  // 2^-16 period, of the table
     output logic moved,  // strobe: position will jump by moved_by
     output logic signed [47:0] moved_by,  // 2^-16 period, in the next cycle
     output logic moves,  // level: position will jump, with the table
     output logic step_made,  // strobe: position moves in the next cycle
     output logic step_down  // level: with step_made, it goes down
 );
+    // the position is a whole number of quarters of a period
+    localparam bit QUARTERS = HAS_SINE == 0 && SEGMENTS == 0 && HAS_BACKLASH == 0;
     localparam int CAPTURE_DELAY = SEGMENTS == 0 ? 2 : 3;  // cycles from an index to its position
 
     if (SEGMENTS != 0 && (SEGMENTS < 3 || SEGMENTS > 255)) begin : g_check_segments
@@ -184,6 +192,11 @@ module feedback_channel #(
     wire segment_in_force, segment_outside, segment_known, shifted;
     wire signed [31:0] shifted_periods;
     wire signed [23:0] segment_error, segment_stored;
+    // backlash
+    wire signed [47:0] sensor_position;
+    wire [23:0] backlash, backlash_rate;
+    wire [6:0] backlash_hysteresis;
+    wire       backlash_motor_side;
     // capture and compare
     wire present, overrun, armed, late;
     wire [ 6:0] captured_sources;
@@ -383,7 +396,7 @@ module feedback_channel #(
         .segment_stored,
         // position
         .position_valid,
-        .position,
+        .position(sensor_position),
         .moved,
         .moved_by,
         .moves,
@@ -392,9 +405,37 @@ module feedback_channel #(
         .step_made,
         .step_down
     );
+    if (HAS_BACKLASH != 0) begin : g_backlash
+        backlash_compensation u_backlash (
+            .clk,
+            .rst,
+            .tick,
+            // settings
+            .backlash,
+            .take_up_rate  (backlash_rate),
+            .hysteresis    (backlash_hysteresis),
+            .motor_side    (backlash_motor_side),
+            // motion_engine
+            .valid         (result_valid),
+            .kind          (result_kind),
+            .result,
+            // position
+            .position      (sensor_position),
+            .table_position(position),
+            .take_up
+        );
+    end else begin : g_no_backlash
+        assign position = sensor_position;
+        assign take_up  = '0;
+
+        wire unused_backlash = &{
+            1'b0, backlash, backlash_rate, backlash_hysteresis, backlash_motor_side,
+            result_valid, result_kind, result
+        };
+    end
     position_events #(
         .CAPTURE_DELAY(CAPTURE_DELAY),
-        .ZEROS        (HAS_SINE == 0 && SEGMENTS == 0 ? 14 : 0),  // counts: quarters of a period
+        .ZEROS        (QUARTERS ? 14 : 0),
         .HAS_CAPTURE  (HAS_CAPTURE),
         .HAS_COMPARE  (HAS_COMPARE)
     ) u_position_events (
@@ -444,7 +485,8 @@ module feedback_channel #(
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_RECORDER     (HAS_RECORDER),
         .HAS_COMPARE      (HAS_COMPARE),
-        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK)
+        .HAS_ENCODER_CHECK(HAS_ENCODER_CHECK),
+        .HAS_BACKLASH     (HAS_BACKLASH)
     ) u_registers (
         .clk,
         .rst,
@@ -549,7 +591,12 @@ module feedback_channel #(
         .segment_read_border                (segment_read_point),
         .segment_read_written               (segment_read),
         .segment_stored,
-        .segment_error
+        .segment_error,
+        // backlash
+        .backlash,
+        .backlash_rate,
+        .backlash_rate_hysteresis           (backlash_hysteresis),
+        .backlash_rate_motor_side           (backlash_motor_side)
     );
 
     wire unused = &{1'b0, direction, illegal_seen, illegal_fault, revolution_fault, levels[2]};

@@ -42,6 +42,7 @@ module motion #(
     input wire [AXES-1:0] block_up,  // levels: no positive command passes
     input wire [AXES-1:0] block_down,  // levels: no negative command passes
     input wire [AXES-1:0] closed_loop,  // levels: the servo commands the drive
+    input wire [24*AXES-1:0] take_up,  // 2^-16 period, by which the motor is before the table
     input wire [AXES-1:0] enabled,  // levels: the drive is on
     // requests, bit n: axis n
     input wire [AXES-1:0] play,  // strobes: play the queued segments
@@ -195,6 +196,7 @@ module motion #(
             .block_up,
             .block_down,
             .closed_loop,
+            .take_up,
             // requests
             .start                 (play | stream_start),
             .arm,
@@ -229,7 +231,7 @@ module motion #(
         wire unused_registers = &{1'b0, stores, stored_at, stored_value, wdata_low};
         wire unused_axes = &{
             1'b0, position, step_made, step_down, moves, moved, moved_by, block_up, block_down,
-            closed_loop
+            closed_loop, take_up
         };
         wire unused_requests = &{1'b0, play, arm, controlled_stop, hold_target, pending, enabled};
     end

@@ -41,6 +41,7 @@ module node #(
     parameter int HAS_DAC = HAS_DRIVE,  // axes with a DAC, needs the drive
     parameter int HAS_FINE_STAGE = HAS_DAC,  // axes with a fine stage, needs the DAC
     parameter int HAS_SET_POINTS = 0,  // axes that can follow streamed set-points, needs the drive
+    parameter int HAS_BACKLASH = 0,  // axes with compensation of backlash, needs the drive
     parameter int HAS_I2C = 0,  // 1: build the I2C master
     parameter int HAS_PS2 = 0,  // 1: build the PS/2 pass-through
     parameter int HAS_PEER = 0,  // 1: build the peer port
@@ -49,6 +50,7 @@ module node #(
     parameter int HAS_STATUS_INPUTS = 0,  // 1: build the status inputs
     parameter int SCOPE_WORDS = 0,  // words of the recorder of ticks; 0: none, and no excitation
     parameter int HAS_LINK = 0,  // 1: build the real-time link
+    parameter int LINK_UDP = 0,  // carrier of the link, 0: serial line, 1: UDP datagrams
     parameter int HAS_SERIAL_CORE = 0,  // 1: bit-serial soft core, with its firmware in a flash
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
     parameter FIRMWARE = "",  // file of its contents at power-up
@@ -69,6 +71,19 @@ module node #(
     input  wire               link_rx,              // pin, idles high
     output logic              link_tx,              // pin, idles high
     output logic              link_driver_enable,   // pin, 1: drive the line
+    // UDP datagrams of the real-time link, from and to an Ethernet core with the same clock
+    input  wire               udp_rx_valid,         // level, synchronous to clk: a byte
+    input  wire  [       7:0] udp_rx_data,          // byte, synchronous to clk
+    input  wire               udp_rx_last,          // level, synchronous to clk: the last byte
+    input  wire               udp_rx_error,         // level, synchronous to clk: it is damaged
+    input  wire  [      47:0] udp_rx_sender,        // IP address and port, synchronous to clk
+    output logic              udp_rx_ready,         // level: with udp_rx_valid, the byte is taken
+    output logic              udp_tx_valid,         // level: a byte
+    output logic [       7:0] udp_tx_data,          // byte
+    output logic              udp_tx_last,          // level: with udp_tx_valid, the last byte
+    output logic [      47:0] udp_tx_receiver,      // IP address, UDP port in bits 15:0
+    output logic [      15:0] udp_tx_length,        // bytes of the datagram
+    input  wire               udp_tx_ready,         // level, synchronous to clk: the byte is taken
     // flash of a serial core
     output logic              flash_cs_n,           // pin, low during a command
     output logic              flash_sclk,           // pin, idles low
@@ -157,6 +172,7 @@ module node #(
     wire [AXES-1:0] start;
     // motion engine
     wire [48*AXES-1:0] position, moved_by;
+    wire [24*AXES-1:0] take_up;
     wire [AXES-1:0] step_made, step_down, moves, moved, block_up, block_down, closed_loop;
     wire [AXES-1:0] play, arm, controlled_stop, hold_target, request_waits, pending;
     wire result_valid, result_flag, servo_overrun;
@@ -167,14 +183,21 @@ module node #(
     wire [32*AXES-1:0] stream_states, stream_counts;
     // recorder of ticks, excitation
     wire [2:0] scope_axis, excitation_axis;
-    wire [5:0] scope_signals;
-    wire [15:0] scope_length, scope_every;
-    wire scope_start, scope_read, scope_recording, scope_full, excitation_written;
-    wire        [31:0] scope_word;
-    wire        [12:0] excitation_period;
-    wire        [14:0] excitation_limit;
-    wire signed [15:0] excitation_value;
-    wire        [11:0] excitation_at;
+    wire [9:0] scope_signals;
+    wire [3:0] scope_trigger;
+    wire [2:0] scope_mode;
+    wire [15:0] scope_length, scope_every, scope_earlier, scope_delay;
+    wire scope_start, scope_read, excitation_written;
+    wire [31:0] scope_level, scope_word;
+    wire [ 1:0] scope_phase;
+    wire [16:0] scope_available;
+    wire [16*AXES-1:0] phases, fine_commands;
+    wire        [48*AXES-1:0] targets;
+    wire        [13*AXES-1:0] axis_faults;
+    wire        [       12:0] excitation_period;
+    wire        [       14:0] excitation_limit;
+    wire signed [       15:0] excitation_value;
+    wire        [       11:0] excitation_at;
     // lines of motor steps
     wire line_start, line_idle, rate_restart, rate_steep;
     wire [AXES-1:0] rate_valid, line_stopped;
@@ -349,11 +372,16 @@ module node #(
         // recorder of ticks
         .scope_axis,
         .scope_signals,
+        .scope_trigger,
+        .scope_mode,
         .scope_samples_length    (scope_length),
         .scope_samples_every     (scope_every),
-        .scope_state_start       (scope_start),
-        .scope_state_recording   (scope_recording),
-        .scope_state_full        (scope_full),
+        .scope_place_earlier     (scope_earlier),
+        .scope_place_delay       (scope_delay),
+        .scope_level,
+        .scope_level_written     (scope_start),
+        .scope_state_phase       (scope_phase),
+        .scope_state_available   (scope_available),
         .scope_word,
         .scope_word_read         (scope_read),
         // excitation
@@ -451,6 +479,7 @@ module node #(
         .block_up,
         .block_down,
         .closed_loop,
+        .take_up,
         .enabled    (drive_enable),
         // requests
         .play,
@@ -483,7 +512,7 @@ module node #(
     );
 
     if (SCOPE_WORDS != 0) begin : g_scope
-        wire         first;
+        wire first, triggered;
         wire [W-1:0] sine = sample_sin[W*scope_axis+:W];
         wire [W-1:0] cosine = sample_cos[W*scope_axis+:W];
 
@@ -493,6 +522,7 @@ module node #(
             // settings
             .axis       (excitation_axis),
             .period     (excitation_period),
+            .running    (triggered),
             .limit      (excitation_limit),
             .store      (excitation_written),
             .store_at   (excitation_at),
@@ -512,31 +542,45 @@ module node #(
             .clk,
             .rst,
             // settings
-            .start      (scope_start),
-            .axis       (scope_axis),
-            .signals    (scope_signals),
-            .length     (scope_length),
-            .every      (scope_every),
+            .start         (scope_start),
+            .axis          (scope_axis),
+            .signals       (scope_signals),
+            .trigger_signal(scope_trigger),
+            .trigger_mode  (scope_mode),
+            .level         (scope_level),
+            .length        (scope_length),
+            .every         (scope_every),
+            .earlier       (scope_earlier),
+            .delay         (scope_delay),
             // what is recorded
             .tick,
-            .ready      (first),
-            .sine_cosine({16'($signed(cosine)), 16'($signed(sine))}),
-            .valid      (result_valid),
+            .ready         (first),
+            .sine_cosine   ({16'($signed(cosine)), 16'($signed(sine))}),
+            .target        (targets[48*scope_axis+:32]),
+            .position      (position[48*scope_axis+:32]),
+            .interpolated  (32'(phases[16*scope_axis+:16])),
+            .fine_command  (32'($signed(fine_commands[16*scope_axis+:16]))),
+            .faults        (32'(axis_faults[13*scope_axis+:13])),
+            .valid         (result_valid),
             .result_axis,
-            .kind       (result_kind),
-            .result     (result[31:0]),
+            .kind          (result_kind),
+            .result        (result[31:0]),
             // reading
-            .read       (scope_read),
-            .word       (scope_word),
-            .recording  (scope_recording),
-            .full       (scope_full)
+            .read          (scope_read),
+            .word          (scope_word),
+            .phase         (scope_phase),
+            .available     (scope_available),
+            // excitation
+            .triggered
         );
     end else begin : g_no_scope
         assign result = computed;
-        assign {scope_word, scope_recording, scope_full} = '0;
+        assign {scope_word, scope_phase, scope_available} = '0;
 
         wire unused_scope = &{
-            1'b0, scope_axis, scope_signals, scope_length, scope_every, scope_start, scope_read
+            1'b0, scope_axis, scope_signals, scope_trigger, scope_mode, scope_level, scope_length,
+            scope_every, scope_earlier, scope_delay, scope_start, scope_read, phases,
+            fine_commands, axis_faults, targets
         };
         wire unused_excitation = &{
             1'b0, excitation_axis, excitation_period, excitation_limit, excitation_value,
@@ -594,7 +638,8 @@ module node #(
 
     link_port #(
         .CLK_HZ(CLK_HZ),
-        .BUILT (HAS_LINK)
+        .BUILT (HAS_LINK),
+        .UDP   (LINK_UDP)
     ) u_link (
         .clk,
         .rst,
@@ -614,11 +659,25 @@ module node #(
         .link_rdata      (rdata),
         // node
         .now             (now[31:0]),
+        .drive_on        (|drive_enable),
         .watchdog_expired(link_expired),
-        // pins
+        // pins of the serial line
         .link_rx,
         .link_tx,
-        .link_driver_enable
+        .link_driver_enable,
+        // UDP datagrams
+        .udp_rx_valid,
+        .udp_rx_data,
+        .udp_rx_last,
+        .udp_rx_error,
+        .udp_rx_sender,
+        .udp_rx_ready,
+        .udp_tx_valid,
+        .udp_tx_data,
+        .udp_tx_last,
+        .udp_tx_receiver,
+        .udp_tx_length,
+        .udp_tx_ready
     );
     if (HAS_LINK != 0) begin : g_master
         assign master_request[1] = link_request;
@@ -738,7 +797,8 @@ module node #(
             .HAS_STEPPER      (HAS_STEPPER >> n & 1),
             .HAS_DAC          (HAS_DAC >> n & 1),
             .HAS_FINE_STAGE   (HAS_FINE_STAGE >> n & 1),
-            .HAS_SET_POINTS   (HAS_SET_POINTS >> n & 1)
+            .HAS_SET_POINTS   (HAS_SET_POINTS >> n & 1),
+            .HAS_BACKLASH     (HAS_BACKLASH >> n & 1)
         ) u_axis (
             .clk,
             .rst,
@@ -777,6 +837,7 @@ module node #(
             .block_up             (block_up[n]),
             .block_down           (block_down[n]),
             .closed_loop          (closed_loop[n]),
+            .take_up              (take_up[24*n+:24]),
             .play                 (play[n]),
             .arm                  (arm[n]),
             .controlled_stop      (controlled_stop[n]),
@@ -829,6 +890,11 @@ module node #(
             .chain_overspeed      (chain_overspeed[n]),
             .chain_disagreement   (chain_disagreement[n]),
             .chain_lost           (chain_lost[n]),
+            // tick_recorder
+            .target               (targets[48*n+:48]),
+            .phase                (phases[16*n+:16]),
+            .fine_command         (fine_commands[16*n+:16]),
+            .faults               (axis_faults[13*n+:13]),
             // pins of the machine
             .limit_low_open       (limit_low_open[n]),
             .limit_high_open      (limit_high_open[n]),

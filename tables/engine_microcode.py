@@ -148,6 +148,7 @@ OUTSIDE = ("0", "product", "product_high", "product_low", "halve") + (
     "flags",
     "shift_by",
     "setting",
+    "take_up",
 )
 OPERANDS = (  # how a line names what it adds
     {name: number_of(at) for name, at in ADDRESS.items() if at < 128}
@@ -598,14 +599,14 @@ commanded: acc                          ; test, give command
         two16                           ; y
         product -> sum
 
-# the target in motor steps, with the command as a trim
+# the target in motor steps, with the command as a trim, and with what takes up the backlash
 trim:   trim_scale                      ; y
         target                          ; if negative trim_down
                                         ; if block_up untrimmed
                                         ; goto trimmed
 trim_down:                              ; if block_down untrimmed
 trimmed: acc + product
-untrimmed: acc -> part                  ; y_low
+untrimmed: acc + take_up -> part        ; y_low
         step_ratio                      ; x_low
         step_ratio                      ; x_high
         acc

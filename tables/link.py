@@ -16,6 +16,7 @@ from tables.made_files import ROOT
 SOURCE = ROOT / "tables" / "link.toml"
 RECEIVER = ROOT / "rtl" / "link" / "packet_receiver.sv"
 PLAYER = ROOT / "rtl" / "link" / "packet_player.sv"
+DATAGRAM = ROOT / "rtl" / "link" / "link_datagram.sv"
 HOST = ROOT / "sw" / "host" / "moire" / "made" / "link_tables.py"
 HEADER = ROOT / "sw" / "figures" / "link_packet.h"
 PAGE = ROOT / "docs" / "link.md"
@@ -50,9 +51,11 @@ def constants(table: Table) -> dict[str, int]:
         found |= {f"{part}_{word}".upper(): n for n, word in enumerate(table[part])}
         found[f"{part.upper()}_WORDS"] = len(table[part])
     found["FRAME_WORDS"] = len(table["request"]) + len(table["request_end"]) + CRC_WORDS
+    found["REPLY_FRAME_WORDS"] = len(table["reply"]) + len(table["reply_end"]) + CRC_WORDS
     found["LONGEST_WORDS"] = table["longest"]
-    frame = max(found["FRAME_WORDS"], found["REPLY_WORDS"] + found["REPLY_END_WORDS"] + CRC_WORDS)
+    frame = max(found["FRAME_WORDS"], found["REPLY_FRAME_WORDS"])
     found["MOST_VALUES"] = table["longest"] - frame
+    found["UDP_PORT"] = table["udp_port"]
     return found
 
 
@@ -142,6 +145,7 @@ def made() -> dict[Path, str]:
     return {
         RECEIVER: module(RECEIVER, found),
         PLAYER: module(PLAYER, found),
+        DATAGRAM: module(DATAGRAM, found),
         HOST: host(table, found),
         HEADER: header(found),
         PAGE: page(table, found),

@@ -5,8 +5,8 @@
 // latency  0 cycles from result to excited; 2 cycles from a command until the next value is added
 // rate     one result per cycle, but commands of the axis at least three cycles apart
 // behaviour Results that are not commands of this axis pass unchanged, and all do while period is
-//          0. The sum is limited to +-limit. The waveform begins with its value 0 after period was
-//          0.
+//          0 or running is low. The sum is limited to +-limit. The waveform begins with its value 0
+//          after that.
 // source   multisine excitation at the input of the plant, in closed loop; here any waveform
 // model    tb/control/command_excitation.py, equal in every bit of every cycle
 // proved   A result that is not a command of the axis passes; a command of it is within +-limit.
@@ -21,6 +21,7 @@ module command_excitation #(
     // settings
     input  wire         [ 2:0] axis,         // number of the axis
     input  wire         [12:0] period,       // values of the waveform, DEPTH at most; 0: off
+    input  wire                running,      // level: the waveform is added
     input  wire         [14:0] limit,        // largest |command|, full scale 2^15
     input  wire                store,        // strobe: store a value of the waveform
     input  wire         [11:0] store_at,     // its number
@@ -45,7 +46,7 @@ module command_excitation #(
     logic signed [15:0] value;  // of the next command
     logic        [12:0] at;  // its number
 
-    wire                on = |period;
+    wire                on = |period && running;
     wire                adds = valid && on && kind == COMMAND && result_axis == axis;
     wire         [12:0] following = at + 1'b1;
     wire signed  [16:0] sum = 17'($signed(result[15:0])) + 17'(value);

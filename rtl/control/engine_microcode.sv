@@ -452,7 +452,7 @@ module engine_microcode #(
         lines[414] = 36'h68207fc20;  // ; goto trimmed
         lines[415] = 36'h68557fc20;  // trim_down: ; if block_down untrimmed
         lines[416] = 36'h00007fc60;  // trimmed: acc + product
-        lines[417] = 36'h000059c29;  // untrimmed: acc -> part ; y_low
+        lines[417] = 36'h000059f29;  // untrimmed: acc + take_up -> part ; y_low
         lines[418] = 36'h00007e5c6;  // step_ratio ; x_low
         lines[419] = 36'h00007e5c7;  // step_ratio ; x_high
         lines[420] = 36'h00007fc20;  // acc

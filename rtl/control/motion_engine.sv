@@ -11,7 +11,8 @@
 //           2^-40 period; the last step rounds to the LSB of target, a half up. Velocity: distance
 //           by time between the last two steps, in 2^-24 period/tick, within one quantum of the
 //           distance of the tick, and bounded by one quantum over the time without a step from the
-//           second half of a tick on. Motor steps: floor(position * step_ratio / 2^32) modulo 2^48.
+//           second half of a tick on. Motor steps: floor((target + trim + take_up) * step_ratio
+//           / 2^32) modulo 2^48.
 // method    One adder of 72 bits, one multiplier of 35 bits and one memory, controlled by the
 //           microcode of tables/engine_microcode.py. A line is fetched, its operand is read in the
 //           next cycle and added in the one after. The words of an axis, its queue, its settings
@@ -67,6 +68,7 @@ module motion_engine #(
     input  wire         [   AXES-1:0] block_up,                // level: no positive command passes
     input  wire         [   AXES-1:0] block_down,              // level: no negative command passes
     input  wire         [   AXES-1:0] closed_loop,             // level: 0: command is open_command
+    input  wire         [24*AXES-1:0] take_up,                 // 2^-16 period, motor before table
     // requests
     input  wire         [   AXES-1:0] start,                   // strobes: play the queue
     input  wire         [   AXES-1:0] arm,                     // strobes: start at start_at
@@ -104,6 +106,7 @@ module motion_engine #(
     localparam [3:0] UPWARD = 4'd11, ALONG = 4'd12;
     localparam int PRODUCT = 1, PRODUCT_HIGH = 2, PRODUCT_LOW = 3, HALVE = 4, POSITION = 5;
     localparam int ELAPSED = 6, PERIOD = 7, NOW = 8, FLAGS = 9, SHIFT_BY = 10, SETTING = 11;
+    localparam int TAKE_UP = 12;
     localparam [7:0] LOAD_CONTEXT = 8'h20, SAMPLE = 8'h23;
     localparam [7:0] STAND = 8'h24, POP = 8'h26, PUSH = 8'h27, EMPTY = 8'h28;
     localparam [7:0] BOOTED = 8'h29, FIRST_FILTER = 8'h2A, NEXT_FILTER = 8'h2B;
@@ -125,7 +128,7 @@ module motion_engine #(
     logic        quiet;  // no tick is served, no setting waits, no axis has a request
     // what is seen of this axis
     logic [47:0] axis_position;
-    logic [23:0] axis_elapsed;
+    logic [23:0] axis_elapsed, axis_take_up;
     logic [6:0] requested, level;
     logic axis_asked, axis_gains;
     // time
@@ -139,6 +142,7 @@ module motion_engine #(
     wire  [   SEEN*8-1:0] of_eight = (SEEN * 8)'(seen);
     wire  [   SEEN*4-1:0] of_four = axis[2] ? of_eight[SEEN*4+:SEEN*4] : of_eight[0+:SEEN*4];
     wire  [   SEEN*2-1:0] of_two = axis[1] ? of_four[SEEN*2+:SEEN*2] : of_four[0+:SEEN*2];
+    wire  [     24*8-1:0] all_take_up = (24 * 8)'(take_up);
     wire  [     SEEN-1:0] of_axis = axis[0] ? of_two[SEEN+:SEEN] : of_two[0+:SEEN];
 
     // the lines in work: fetched, and its operand is being read; then the operand is there; then it
@@ -250,7 +254,7 @@ module motion_engine #(
         | ({48{source[ELAPSED]}} & {24'd0, axis_elapsed}) | ({48{source[PERIOD]}} & {24'd0, period})
         | ({48{source[NOW]}} & {16'd0, seen_now})
         | ({48{source[FLAGS]}} & {23'd0, queued, head, flags[15:0]})
-        | ({48{source[SHIFT_BY]}} & shift_by);
+        | ({48{source[SHIFT_BY]}} & shift_by) | ({48{source[TAKE_UP]}} & {24'd0, axis_take_up});
     wire  [71:0] from = stored | multiplied | {{24{outside[47]}}, outside}
         | ({72{source[SETTING]}} & {{8{setting[63]}}, setting});
 
@@ -356,6 +360,7 @@ module motion_engine #(
 
         // the axis
         {axis_gains, axis_asked, level, requested, axis_elapsed, axis_position} <= of_axis;
+        axis_take_up <= all_take_up[24*axis+:24];
 
         // time
         if (tick) begin

@@ -1,108 +1,209 @@
 // SPDX-License-Identifier: Apache-2.0
-// tick_recorder -- record chosen results of one axis at each servo tick, evenly, into a block
-// memory, so that a host can read them in its own time.
+// tick_recorder -- record chosen signals of one axis at each servo tick, evenly, into a block
+// memory, from before a trigger on, so that a host can read them in its own time; or without end,
+// while the host reads.
 //
-// latency  1 cycle from the last result to full; 2 cycles from full to the first word and from
-//          read to the next word
-// rate     one result per cycle while it records; one word per 2 cycles while it is read
-// behaviour A sample begins at a tick and ends with the command of that tick. The first one begins
-//          at the first tick at which `ready` is high. Its words are in the order of the bits of
-//          signals: bit 0 are the samples of sine and cosine at the tick, bit n the result of kind
-//          n. length times the number of signals must be at most WORDS. After the last word the
-//          first one follows again.
+// latency  1 cycle from the last result of a sample to phase and available; 2 cycles from there to
+//          the first word and from read to the next word, and one more for each word that is stored
+//          meanwhile
+// rate     one word per cycle while it records; one word per 2 cycles while it is read
+// behaviour A sample begins at a tick and ends with the command of that tick. Its words are in the
+//          order of the bits of signals. Numbers 1 to 5 are results; the others, and 1 and 2 while
+//          there are none, are taken in the cycles after the tick that have no result.
+//          The trigger looks at one signal of each sample once there are `earlier` samples: mode 0
+//          always, 1 it rises to level, 2 it falls below it, 3 its size reaches level, 4 it has a
+//          bit of level. Without delay that sample follows the `earlier` ones; with delay it is the
+//          first one so many ticks later at whose tick `ready` is high.
+//          The recording ends after length samples, or when no sample fits any more. With length 0
+//          only the latter ends it, and its words can be read while it records.
 // model    tb/control/tick_recorder.py, equal in every bit of every cycle
-// proved   full and recording are never high together; nothing is stored unless recording
-// proof    depth 12, WORDS = 4
+// proved   Nothing is stored unless a recording is waiting or recording; words that are available
+//          were stored, and are not stored over before they are read.
+// proof    depth 12, WORDS = 16
 `default_nettype none
 
 module tick_recorder #(
-    parameter int WORDS = 4096  // words of the memory, a power of two, 65536 at most
+    parameter int WORDS = 4096  // words of the memory, a power of two, 16 to 65536
 ) (
     input  wire         clk,
     input  wire         rst,
     // settings
-    input  wire         start,        // strobe: record from now on
-    input  wire  [ 2:0] axis,         // number of the axis
-    input  wire  [ 5:0] signals,      // bit n: record signal n
-    input  wire  [15:0] length,       // samples, 1 at least
-    input  wire  [15:0] every,        // one sample in so many ticks; 0 acts as 1
+    input  wire         start,           // strobe: record from now on
+    input  wire  [ 2:0] axis,            // number of the axis
+    input  wire  [ 9:0] signals,         // bit n: record signal n
+    input  wire  [ 3:0] trigger_signal,  // number of the signal of the trigger
+    input  wire  [ 2:0] trigger_mode,    // how it triggers
+    input  wire  [31:0] level,           // of the trigger, signed
+    input  wire  [15:0] length,          // samples; 0: no end
+    input  wire  [15:0] every,           // one sample in so many ticks; 0 acts as 1
+    input  wire  [15:0] earlier,         // samples from before the trigger, less than length
+    input  wire  [15:0] delay,           // ticks from the trigger; 0 keeps its sample
     // what is recorded
-    input  wire         tick,         // strobe: servo tick
-    input  wire         ready,        // level: the first sample may begin
-    input  wire  [31:0] sine_cosine,  // samples of the axis, cosine in the upper half
-    input  wire         valid,        // strobe: result is new
-    input  wire  [ 2:0] result_axis,  // number of its axis
-    input  wire  [ 2:0] kind,         // number of what it is
-    input  wire  [31:0] result,       // its lower half
+    input  wire         tick,            // strobe: servo tick
+    input  wire         ready,           // level: the sample after a delay may begin
+    input  wire  [31:0] sine_cosine,     // samples of the axis, cosine in the upper half
+    input  wire  [31:0] target,          // the last result 1 of the axis
+    input  wire  [31:0] position,        // 2^-16 period, low word
+    input  wire  [31:0] interpolated,    // phase, 2^-16 period
+    input  wire  [31:0] fine_command,    // full scale 2^15, signed
+    input  wire  [31:0] faults,          // bits as in axis_registers.faults
+    input  wire         valid,           // strobe: result is new
+    input  wire  [ 2:0] result_axis,     // number of its axis
+    input  wire  [ 2:0] kind,            // number of what it is
+    input  wire  [31:0] result,          // its lower half
     // reading
-    input  wire         read,         // strobe: go on to the next word
-    output logic [31:0] word,         // word of the recording
-    output logic        recording,    // level: the recording is not complete
-    output logic        full          // level: the recording is complete
+    input  wire         read,            // strobe: go on to the next word
+    output logic [31:0] word,            // word of the recording
+    output logic [ 1:0] phase,           // 0 empty, 1 waiting for the trigger, 2 recording, 3 full
+    output logic [16:0] available,       // words that can be read
+    // command_excitation
+    output logic        triggered        // level: from the trigger to the end of the recording
 );
-    if (WORDS < 2 || WORDS > 65536 || (WORDS & (WORDS - 1)) != 0) begin : g_check
-        WORDS_MUST_BE_A_POWER_OF_TWO_UP_TO_65536 u_error ();
+    if (WORDS < 16 || WORDS > 65536 || (WORDS & (WORDS - 1)) != 0) begin : g_check
+        WORDS_MUST_BE_A_POWER_OF_TWO_FROM_16_TO_65536 u_error ();
     end
 
     localparam [2:0] COMMAND = 3'd5;  // kind of result, as in tables/engine_microcode.py
+    localparam [2:0] TAKEN = 3'd7;  // signals that are taken
+    localparam [1:0] EMPTY = 2'd0, WAITING = 2'd1, RECORDING = 2'd2, FULL = 2'd3;
+    localparam [2:0] ALWAYS = 3'd0, RISES = 3'd1, FALLS = 3'd2, BEYOND = 3'd3, BITS = 3'd4;
     localparam int A = $clog2(WORDS);
 
     // number of signals below this one
-    function [2:0] ones(input [5:0] bits);
+    function [3:0] ones(input [9:0] bits);
         ones = '0;
-        for (int n = 0; n < 6; n++) ones = ones + 3'(bits[n]);
+        for (int n = 0; n < 10; n++) ones = ones + 4'(bits[n]);
     endfunction
 
     logic [31:0] memory[0:WORDS-1];
     logic [A-1:0] base, at;  // first word of the sample; word that is read
-    logic [15:0] left, passed;  // samples that are missing; ticks since the last sample
-    logic         begun;  // the first sample has begun
-    logic         taking;  // the results of this tick are recorded
+    logic [16:0] used;  // words of complete samples that are kept
+    logic [15:0] kept, passed, left;  // samples; ticks since the last one, and of the delay
+    logic [2:0] take;  // the next signal that is taken; TAKEN: none
+    logic [1:0] got;  // results 1 and 2 have come in this sample
+    logic begun, sampling, delaying;  // there is a sample; it is not complete; the delay runs
+    logic [31:0] watched;  // signal of the trigger
+    logic known, was_above;  // it was seen in a sample; it was above the level
 
-    wire          due = recording && tick && (begun ? passed + 1'b1 >= every : ready);
-    wire          given = valid && taking && result_axis == axis && kind != '0 && kind <= COMMAND;
-    wire  [  5:0] below = due ? '0 : signals & 6'((7'd1 << kind) - 7'd1);
-    wire          keep = due ? signals[0] : given && signals[kind];
-    wire          ends = given && kind == COMMAND && !due;
-    wire  [A-1:0] place = keep ? base + A'(ones(below)) : at;
+    // the words of a sample
+    wire          active = phase == WAITING || phase == RECORDING;
+    wire          over = delaying ? left <= 16'd1 && ready : !begun || passed + 1'b1 >= every;
+    wire          due = active && tick && over;
+    wire          given = valid && sampling && result_axis == axis && kind != '0 && kind <= COMMAND;
+    wire          taken = sampling && !given && take != TAKEN;
+    wire  [  3:0] number = given ? 4'(kind) : take < 3'd3 ? 4'(take) : 4'(take) + 4'd3;
+    wire          stale = taken && |(got &{number == 4'd2, number == 4'd1});
+    wire          new_value = !due && !stale && (given || taken);
+    wire  [  9:0] chosen = 10'd1 << number;
+    wire  [A-1:0] place = base + A'(ones(signals & (chosen - 1'b1)));
+    wire          keep = new_value && |(signals & chosen);
+
+    logic [ 31:0] value;
+    always_comb begin
+        case (take)
+            3'd0: value = sine_cosine;
+            3'd1: value = target;
+            3'd2: value = '0;  // velocity of a target that does not move
+            3'd3: value = position;
+            3'd4: value = interpolated;
+            3'd5: value = fine_command;
+            default: value = faults;
+        endcase
+        if (given) value = result;
+    end
+
+    // the trigger, at the end of a sample
+    wire         ends = given && kind == COMMAND && !due;
+    wire  [31:0] seen = trigger_signal == 4'(COMMAND) ? value : watched;
+    wire         above = $signed(seen) >= $signed(level);
+    wire         below = $signed(seen) <= -$signed(level);
+    logic        hits;
+    always_comb begin
+        case (trigger_mode)
+            RISES:   hits = known && above && !was_above;
+            FALLS:   hits = known && !above && was_above;
+            BEYOND:  hits = above || below;
+            BITS:    hits = |(seen & level);
+            default: hits = trigger_mode == ALWAYS;
+        endcase
+    end
+    // the end of a sample
+    wire [16:0] each = 17'(ones(signals));
+    wire        fits = used + each + each <= 17'(WORDS);  // this sample and one more
+    wire        ripe = kept == earlier || !fits;
+    wire        counts = phase == RECORDING || delaying || hits && ripe && delay == '0;
+    wire        drops = ends && !counts && ripe;  // the oldest sample
+    wire        last = !fits || length != '0 && kept + 1'b1 >= length;
+    wire        passes = read && available != '0;
+
+    assign available = phase == FULL || phase == RECORDING && length == '0 ? used : '0;
+    assign triggered = phase == RECORDING || delaying;
 
     always_ff @(posedge clk) begin
-        // one port: a recording is read when it is complete
-        if (keep) memory[place] <= due ? sine_cosine : result;
-        else word <= memory[place];
+        // one port: what is stored comes first
+        if (keep) memory[place] <= value;
+        else word <= memory[at];
     end
 
     always_ff @(posedge clk) begin
-        if (recording && tick) passed <= due ? '0 : passed + 1'b1;
-        if (due) {begun, taking} <= 2'b11;
-        if (ends) begin
-            taking <= 1'b0;
-            base   <= base + A'(ones(signals));
-            left   <= left - 1'b1;
-            if (left <= 16'd1) {recording, full} <= 2'b01;
+        if (active && tick) begin
+            passed <= due ? '0 : passed + 1'b1;
+            if (left > 16'd1) left <= left - 1'b1;
         end
-        if (full && read) at <= at + 1'b1;
+        if (taken) take <= take + 1'b1;
+        if (given && kind == 3'd1) got[0] <= 1'b1;
+        if (given && kind == 3'd2) got[1] <= 1'b1;
+        if (new_value && number == trigger_signal) watched <= value;
+        if (ends) begin
+            sampling <= 1'b0;
+            {known, was_above} <= {1'b1, above};
+            base <= base + each[A-1:0];
+            if (!drops) kept <= kept + 1'b1;
+            if (counts) phase <= last ? FULL : RECORDING;
+            delaying <= !counts && hits && ripe;
+            if (hits && !delaying) left <= delay;
+        end
+        if (due) begin
+            {begun, sampling} <= 2'b11;
+            take <= '0;
+            got  <= '0;
+        end
+        used <= used + (ends && !drops ? each : '0) - 17'(passes);
+        at   <= at + (drops ? each[A-1:0] : A'(passes));
         if (start) begin
-            {recording, full, begun, taking} <= 4'b1000;
+            phase <= WAITING;
+            {begun, sampling, delaying, known} <= '0;
             base   <= '0;
             at     <= '0;
-            left   <= length;
+            used   <= '0;
+            kept   <= '0;
             passed <= '0;
+            left   <= '0;
         end
-        if (rst) {recording, full, begun, taking} <= '0;
+        if (rst) begin
+            phase <= EMPTY;
+            {begun, sampling, delaying, known} <= '0;
+            used <= '0;
+        end
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic         past = 1'b0;
+    wire  [A-1:0] distance = place - at;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        if (past) begin
-            assert (!(recording && full));
-            assert (!taking || recording);
-            assert (!keep || recording);
+        if (past && !$past(rst)) begin
+            assume (start || signals == $past(signals));
+            assert (!keep || active);
+            assert (!active || base == A'(at + used[A-1:0]));
+            assert (used <= 17'(WORDS) && available <= used);
+            assert (start || !keep || 17'(distance) >= used);
+            assert (!sampling || active);
+            assert (!delaying || phase == WAITING);
+            assert (start || !active || used + each <= 17'(WORDS));
         end
-        cover (past && full && word == 32'h1234_5678);
+        cover (past && phase == FULL && word == 32'h1234_5678);
     end
 `endif
 endmodule

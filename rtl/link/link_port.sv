@@ -1,51 +1,79 @@
 // SPDX-License-Identifier: Apache-2.0
-// link_port -- the node's port to the real-time link: a serial line of 8N1 bytes, packets in COBS
-// frames, and process_link, behind a register block.
+// link_port -- the node's port to the real-time link: process_link behind a register block, with a
+// serial line of 8N1 bytes and packets in COBS frames, or with UDP datagrams.
 //
 // latency   see the blocks
 // rate      see the blocks
-// behaviour The receiver does not hear what the node sends. The line driver stays on from the first
-//           bit of a reply to the last one. If it is not built, its pins are idle, all registers
-//           read 0, and it never accesses the register bus.
+// behaviour The receiver of the line does not hear what the node sends. The line driver stays on
+//           from the first bit of a reply to the last one. The outputs of the carrier that is not
+//           built are idle. If the link is not built, its outputs are idle, all registers read 0,
+//           and it never accesses the register bus.
 // source    docs/link.md
 // model     the models of its blocks; tested together by tb/link/test_link_port.py
 `default_nettype none
 
 module link_port #(
     parameter int CLK_HZ = 60_000_000,  // Hz, clk frequency; a multiple of 1000
-    parameter int BUILT  = 1            // 0: no logic, all outputs are idle
+    parameter int BUILT  = 1,           // 0: no logic, all outputs are idle
+    parameter int UDP    = 0            // 0: serial line, 1: UDP datagrams
 ) (
     input  wire         clk,
     input  wire         rst,
     // register bus, as one of its blocks
-    input  wire         select,             // strobe: an access to this block
-    input  wire         write,              // level: the access writes
-    input  wire  [ 5:0] word,               // 32-bit word of the block
-    input  wire  [31:0] wdata,              // value to write
-    output logic [31:0] rdata,              // value read, in the next cycle; else 0
+    input  wire         select,              // strobe: an access to this block
+    input  wire         write,               // level: the access writes
+    input  wire  [ 5:0] word,                // 32-bit word of the block
+    input  wire  [31:0] wdata,               // value to write
+    output logic [31:0] rdata,               // value read, in the next cycle; else 0
     // register bus, as one of its masters
-    output logic        request,            // level: an access waits for ready
-    input  wire         ready,              // level: the registers take it in the next cycle
-    output logic        link_select,        // strobe: an access
-    output logic        link_write,         // level: it writes
-    output logic [15:0] link_address,       // byte address, from 1 cycle before link_select on
-    output logic [31:0] link_wdata,         // word to be written
-    input  wire  [31:0] link_rdata,         // word read, 2 cycles after link_select
+    output logic        request,             // level: an access waits for ready
+    input  wire         ready,               // level: the registers take it in the next cycle
+    output logic        link_select,         // strobe: an access
+    output logic        link_write,          // level: it writes
+    output logic [15:0] link_address,        // byte address, from 1 cycle before link_select on
+    output logic [31:0] link_wdata,          // word to be written
+    input  wire  [31:0] link_rdata,          // word read, 2 cycles after link_select
     // node
-    input  wire  [31:0] now,                // cycles, time of the node
-    output logic        watchdog_expired,   // level: no good request for too long
-    // pins
-    input  wire         link_rx,            // pin, idles high
-    output logic        link_tx,            // pin, idles high
-    output logic        link_driver_enable  // pin, 1: drive the line
+    input  wire  [31:0] now,                 // cycles, time of the node
+    input  wire         drive_on,            // level: a drive is on, the host stays
+    output logic        watchdog_expired,    // level: no good request for too long
+    // pins of the serial line
+    input  wire         link_rx,             // pin, idles high
+    output logic        link_tx,             // pin, idles high
+    output logic        link_driver_enable,  // pin, 1: drive the line
+    // UDP datagrams
+    input  wire         udp_rx_valid,        // level: a byte of a datagram
+    input  wire  [ 7:0] udp_rx_data,         // byte
+    input  wire         udp_rx_last,         // level: with udp_rx_valid, the last byte
+    input  wire         udp_rx_error,        // level: with udp_rx_valid, the datagram is damaged
+    input  wire  [47:0] udp_rx_sender,       // IP address, UDP port in bits 15:0
+    output logic        udp_rx_ready,        // level: with udp_rx_valid, the byte is taken
+    output logic        udp_tx_valid,        // level: a byte of a datagram
+    output logic [ 7:0] udp_tx_data,         // byte
+    output logic        udp_tx_last,         // level: with udp_tx_valid, the last byte
+    output logic [47:0] udp_tx_receiver,     // IP address, UDP port in bits 15:0
+    output logic [15:0] udp_tx_length,       // bytes of the datagram
+    input  wire         udp_tx_ready         // level: with udp_tx_valid, the byte is taken
 );
-    if (BUILT == 0) begin : g_none
-        assign {rdata, request, link_select, link_write, link_address, link_wdata} = '0;
-        assign {watchdog_expired, link_tx, link_driver_enable} = 3'b010;
+    if (BUILT == 0 || UDP == 0) begin : g_no_udp
+        assign {udp_rx_ready, udp_tx_valid, udp_tx_data, udp_tx_last} = '0;
+        assign {udp_tx_receiver, udp_tx_length} = '0;
 
         wire unused = &{
-            1'b0, clk, rst, select, write, word, wdata, ready, link_rdata, now, link_rx
+            1'b0, drive_on, udp_rx_valid, udp_rx_data, udp_rx_last, udp_rx_error, udp_rx_sender,
+            udp_tx_ready
         };
+    end
+    if (BUILT == 0 || UDP != 0) begin : g_no_line
+        assign {link_tx, link_driver_enable} = 2'b10;
+
+        wire unused = &{1'b0, link_rx};
+    end
+    if (BUILT == 0) begin : g_none
+        assign {rdata, request, link_select, link_write, link_address, link_wdata} = '0;
+        assign watchdog_expired = 1'b0;
+
+        wire unused = &{1'b0, clk, rst, select, write, word, wdata, ready, link_rdata, now};
     end else begin : g_link
         // settings
         wire [23:0] session, time_window;
@@ -56,58 +84,10 @@ module link_port #(
         // state
         wire [47:0] refused;
         wire busy, framing_errors;
-        // line
-        wire rx_level, rx, tx_level, sends, sending, transmitting, tick;
-        wire received, ninth, start_glitch, receiving;
-        wire [7:0] received_byte, byte_to_send;
-        wire to_send, send_ready;
         // packets
-        wire rx_valid, rx_ends, rx_broken, tx_valid, tx_last, tx_taken;
+        wire rx_valid, rx_ends, rx_broken, rx_foreign, accepted, tx_valid, tx_last, tx_taken;
         wire [7:0] rx_data, tx_data;
 
-        assign link_driver_enable = sends || sending;
-
-        half_duplex u_duplex (
-            .driver_enable(link_driver_enable),
-            .tx_level,
-            .rx_pin       (link_rx),
-            .tx_pin       (link_tx),
-            .rx_level
-        );
-        synchroniser #(
-            .RESET(1)
-        ) u_pin (
-            .clk,
-            .rst,
-            .d(rx_level),
-            .q(rx)
-        );
-        uart_rx #(
-            .NINTH(0),
-            .PARTS(4)
-        ) u_receiver (
-            .clk,
-            .rst,
-            .bit_time,
-            .rx,
-            .valid        (received),
-            .data         (received_byte),
-            .ninth,
-            .framing_error(framing_errors),
-            .start_glitch,
-            .busy         (receiving)
-        );
-        cobs_decoder u_decoder (
-            .clk,
-            .rst,
-            .valid    (received),
-            .data     (received_byte),
-            .lost     (framing_errors),
-            .valid_out(rx_valid),
-            .data_out (rx_data),
-            .ends     (rx_ends),
-            .broken   (rx_broken)
-        );
         process_link #(
             .CLK_HZ(CLK_HZ)
         ) u_link (
@@ -133,6 +113,8 @@ module link_port #(
             .rx_data,
             .rx_ends,
             .rx_broken,
+            .rx_foreign,
+            .accepted,
             .tx_valid,
             .tx_data,
             .tx_last,
@@ -146,34 +128,118 @@ module link_port #(
             .wdata      (link_wdata),
             .rdata      (link_rdata)
         );
-        cobs_encoder u_encoder (
-            .clk,
-            .rst,
-            .valid   (tx_valid),
-            .data    (tx_data),
-            .last    (tx_last),
-            .taken   (tx_taken),
-            .sends   (to_send),
-            .data_out(byte_to_send),
-            .ready   (send_ready),
-            .busy    (sends)
-        );
-        uart_tx #(
-            .NINTH(0),
-            .PARTS(4)
-        ) u_transmitter (
-            .clk,
-            .rst,
-            .bit_time,
-            .valid        (to_send),
-            .ready        (send_ready),
-            .data         (byte_to_send),
-            .ninth        (1'b0),
-            .tx           (tx_level),
-            .driver_enable(sending),
-            .busy         (transmitting),
-            .tick
-        );
+        if (UDP == 0) begin : g_line
+            wire rx_level, rx, tx_level, sends, sending, transmitting, tick;
+            wire received, ninth, start_glitch, receiving;
+            wire [7:0] received_byte, byte_to_send;
+            wire to_send, send_ready;
+
+            assign link_driver_enable = sends || sending;
+
+            half_duplex u_duplex (
+                .driver_enable(link_driver_enable),
+                .tx_level,
+                .rx_pin       (link_rx),
+                .tx_pin       (link_tx),
+                .rx_level
+            );
+            synchroniser #(
+                .RESET(1)
+            ) u_pin (
+                .clk,
+                .rst,
+                .d(rx_level),
+                .q(rx)
+            );
+            uart_rx #(
+                .NINTH(0),
+                .PARTS(4)
+            ) u_receiver (
+                .clk,
+                .rst,
+                .bit_time,
+                .rx,
+                .valid        (received),
+                .data         (received_byte),
+                .ninth,
+                .framing_error(framing_errors),
+                .start_glitch,
+                .busy         (receiving)
+            );
+            cobs_decoder u_decoder (
+                .clk,
+                .rst,
+                .valid    (received),
+                .data     (received_byte),
+                .lost     (framing_errors),
+                .valid_out(rx_valid),
+                .data_out (rx_data),
+                .ends     (rx_ends),
+                .broken   (rx_broken)
+            );
+            cobs_encoder u_encoder (
+                .clk,
+                .rst,
+                .valid   (tx_valid),
+                .data    (tx_data),
+                .last    (tx_last),
+                .taken   (tx_taken),
+                .sends   (to_send),
+                .data_out(byte_to_send),
+                .ready   (send_ready),
+                .busy    (sends)
+            );
+            uart_tx #(
+                .NINTH(0),
+                .PARTS(4)
+            ) u_transmitter (
+                .clk,
+                .rst,
+                .bit_time,
+                .valid        (to_send),
+                .ready        (send_ready),
+                .data         (byte_to_send),
+                .ninth        (1'b0),
+                .tx           (tx_level),
+                .driver_enable(sending),
+                .busy         (transmitting),
+                .tick
+            );
+
+            assign rx_foreign = 1'b0;
+
+            wire unused = &{1'b0, ninth, start_glitch, receiving, transmitting, tick, accepted};
+        end else begin : g_udp
+            link_datagram u_datagram (
+                .clk,
+                .rst,
+                // settings
+                .enable,
+                .reads   (lists_reads),
+                .locked  (drive_on),
+                // datagrams
+                .rx_valid(udp_rx_valid),
+                .rx_last (udp_rx_last),
+                .rx_error(udp_rx_error),
+                .sender  (udp_rx_sender),
+                .rx_ready(udp_rx_ready),
+                .receiver(udp_tx_receiver),
+                .length  (udp_tx_length),
+                // requests
+                .valid   (rx_valid),
+                .ends    (rx_ends),
+                .broken  (rx_broken),
+                .foreign (rx_foreign),
+                .accepted
+            );
+
+            assign rx_data = udp_rx_data;
+            assign {udp_tx_valid, udp_tx_data, udp_tx_last} = {tx_valid, tx_data, tx_last};
+            assign tx_taken = udp_tx_ready;
+            assign framing_errors = 1'b0;
+
+            wire unused = &{1'b0, bit_time};
+        end
 
         link_registers u_registers (
             .clk,
@@ -210,8 +276,6 @@ module link_port #(
             .refused_now_busy       (refused[47:40]),
             .framing_errors
         );
-
-        wire unused = &{1'b0, ninth, start_glitch, receiving, transmitting, tick};
     end
 endmodule
 

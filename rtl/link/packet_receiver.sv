@@ -9,7 +9,8 @@
 //           length of the lists, later than the last accepted one, within the time window, and if
 //           the player is idle. Any other one changes one count. A packet without a byte is
 //           ignored. A packet of which any byte, or the end, comes while enable is low is
-//           foreign, and the last sequence is 0 then.
+//           foreign, and the last sequence is 0 then; a packet that the carrier calls foreign is
+//           so, too.
 // limits    writes up to 122; settings change only while enable is low
 // source    tables/link.toml: the layout of a packet
 // model     tb/link/packet_receiver.py, equal in every bit of every cycle
@@ -33,6 +34,7 @@ module packet_receiver (
     input  wire  [ 7:0] data,         // byte
     input  wire         ends,         // strobe: the packet has ended
     input  wire         broken,       // strobe: the carrier has lost a byte of the packet
+    input  wire         foreign,      // level: with ends, the packet is of a host that may not send
     // player
     input  wire         busy,         // level: a packet is being played or answered
     output logic        accepted,     // strobe: the packet in the bank is to be played
@@ -97,7 +99,7 @@ module packet_receiver (
 
         judged <= ends && some;
         whole  <= crc == WHOLE && !lost && !broken;
-        ours   <= known && enable && !missed;
+        ours   <= known && enable && !missed && !foreign;
         fits   <= count == length;
         later  <= advance != '0 && !advance[31];
         timely <= time_window == '0 || near;
@@ -132,7 +134,7 @@ module packet_receiver (
         some_before  <= ends && some && !rst;
         bytes_before <= count;
         if (past) begin
-            if (accepted) assert (some_before && $past(enable) && $past(!busy) && $past(known));
+            if (accepted) assert (some_before && $past(enable && !busy && known && !foreign));
             if (accepted) assert ($past(crc) == WHOLE && $past(!lost && !broken));
             if (accepted) assert (bytes_before >= 10'd24 && bytes_before == $past(length));
             if (accepted && $past(enable)) assert ($past(sequence_number) != $past(last));

@@ -36,6 +36,8 @@ module process_link #(
     input  wire  [ 7:0] rx_data,      // byte
     input  wire         rx_ends,      // strobe: the packet has ended, after its last byte
     input  wire         rx_broken,    // strobe: the carrier has lost a byte of the packet
+    input  wire         rx_foreign,   // level: with rx_ends, it is of a host that may not send
+    output logic        accepted,     // strobe, 1 cycle after rx_ends: the request is acted upon
     // replies to the carrier
     output logic        tx_valid,     // level: tx_data is a byte of the reply
     output logic [ 7:0] tx_data,      // byte
@@ -50,7 +52,7 @@ module process_link #(
     output logic [31:0] wdata,        // word to be written, from 1 cycle before select on
     input  wire  [31:0] rdata         // word read, 2 cycles after select
 );
-    wire accepted, bank, put;
+    wire bank, put;
     wire [ 6:0] put_at;
     wire [31:0] word;
 
@@ -64,10 +66,11 @@ module process_link #(
         .time_window,
         .now,
         // packets
-        .valid (rx_valid),
-        .data  (rx_data),
-        .ends  (rx_ends),
-        .broken(rx_broken),
+        .valid  (rx_valid),
+        .data   (rx_data),
+        .ends   (rx_ends),
+        .broken (rx_broken),
+        .foreign(rx_foreign),
         // player
         .busy,
         .accepted,

@@ -124,6 +124,8 @@ module axis_registers #(
     input  wire         [ 7:0] built_segments,
     // HAS_SET_POINTS: player of streamed set-points
     input  wire                built_set_points,
+    // HAS_BACKLASH: compensation of backlash
+    input  wire                built_backlash,
     // 0 off, 1 prepared, without a set-point yet, 2 streaming, 3 extrapolating, 4 ended
     input  wire         [ 2:0] stream_state_mode,
     // how the last stream ended: 0 not, 1 released at rest, 2 stopped, 3 set-point late, 4 fault
@@ -194,10 +196,10 @@ module axis_registers #(
         {phase_amplitude, phase_phase}) | ({32{get_quadrature_count}} & quadrature_count) |
         ({32{get_encoder_events}} & {26'd0, encoder_events_held}) | ({32{get_rejected_pulses}} &
         {16'd0, rejected_pulses_count}) | ({32{get_rejected_samples}} & {16'd0,
-        rejected_samples_count}) | ({32{get_built}} & {7'd0, built_set_points, built_segments,
-        built_filters, built_fine_stage, built_dac, built_stepper, built_bridge, built_drive,
-        built_velocity, built_encoder_check, built_compare, built_capture, built_recorder,
-        built_harmonics, built_monitor, built_sine}) | ({32{get_stream_state}} &
+        rejected_samples_count}) | ({32{get_built}} & {6'd0, built_backlash, built_set_points,
+        built_segments, built_filters, built_fine_stage, built_dac, built_stepper, built_bridge,
+        built_drive, built_velocity, built_encoder_check, built_compare, built_capture,
+        built_recorder, built_harmonics, built_monitor, built_sine}) | ({32{get_stream_state}} &
         {stream_state_extrapolated, 2'd0, stream_state_room, stream_state_refusal,
         stream_state_ended, stream_state_mode}) | ({32{get_stream_counts}} & {stream_counts_refused,
         stream_counts_late, stream_counts_accepted}) | ({32{get_following_error}} & following_error)

@@ -11,6 +11,7 @@
 `default_nettype none
 
 module feedback_registers #(
+    parameter int HAS_BACKLASH      = 1,  // 0: settings that need it read 0
     parameter int HAS_COMPARE       = 1,  // 0: settings that need it read 0
     parameter int HAS_ENCODER_CHECK = 1,  // 0: settings that need it read 0
     parameter int HAS_HARMONICS     = 1,  // 0: settings that need it read 0
@@ -165,7 +166,17 @@ module feedback_registers #(
     // error at that border, valid while segment_state.known is 1 [1/65536 period]
     input wire signed [23:0] segment_stored,
     // error subtracted from the position now [1/65536 period]
-    input wire signed [23:0] segment_error
+    input wire signed [23:0] segment_error,
+    // backlash between motor and table: how far the motor turns after a reversal until the table
+    // moves [1/65536 period]
+    output logic [23:0] backlash,
+    // velocity of the motor beyond that of the target; 0: at once [1/65536 period/tick]
+    output logic [23:0] backlash_rate,
+    // how far the target must move back until that is a reversal [1/256 period]
+    output logic [6:0] backlash_rate_hysteresis,
+    // 1: the sensor is on the motor's side, and the position of the axis is that of the table; 0:
+    // it is on the table
+    output logic backlash_rate_motor_side
 );
     logic        index_events_found_held;
     logic        index_events_revolution_wrong_held;
@@ -302,6 +313,10 @@ module feedback_registers #(
         if (put && word == 6'h32) segment_point_border <= wdata[31:24];
         segment_read_written <= put && word == 6'h33;
         if (put && word == 6'h33) segment_read_border <= wdata[7:0];
+        if (HAS_BACKLASH != 0 && put && word == 6'h36) backlash <= wdata[23:0];
+        if (HAS_BACKLASH != 0 && put && word == 6'h37) backlash_rate <= wdata[23:0];
+        if (HAS_BACKLASH != 0 && put && word == 6'h37) backlash_rate_hysteresis <= wdata[30:24];
+        if (HAS_BACKLASH != 0 && put && word == 6'h37) backlash_rate_motor_side <= wdata[31];
 
         if (rst) begin
             get_index_events <= 1'b0;
@@ -385,6 +400,10 @@ module feedback_registers #(
             segment_point_border <= 8'h00;
             segment_read_written <= 1'b0;
             segment_read_border <= 8'h00;
+            backlash <= 24'h000000;
+            backlash_rate <= 24'h000000;
+            backlash_rate_hysteresis <= 7'h00;
+            backlash_rate_motor_side <= 1'b0;
         end
     end
 endmodule

@@ -11,16 +11,16 @@
 
 module node_registers (
     input  wire                clk,
-    input  wire                rst,                      // settings take their first values
-    input  wire                select,                   // strobe: access to this block
-    input  wire                write,                    // level: it writes wdata
-    input  wire         [ 5:0] word,                     // index of the word
-    input  wire         [31:0] wdata,                    // value to write
-    output logic        [31:0] rdata,                    // live bits read; else 0
-    input  wire         [31:0] clk_hz,                   // frequency of clk [Hz]
-    input  wire         [ 3:0] build_axes,               // what is built: axes
-    input  wire         [ 3:0] build_address,            // what is built: address
-    input  wire         [ 7:0] build_memory,             // what is built: memory [1024 byte]
+    input  wire                rst,                       // settings take their first values
+    input  wire                select,                    // strobe: access to this block
+    input  wire                write,                     // level: it writes wdata
+    input  wire         [ 5:0] word,                      // index of the word
+    input  wire         [31:0] wdata,                     // value to write
+    output logic        [31:0] rdata,                     // live bits read; else 0
+    input  wire         [31:0] clk_hz,                    // frequency of clk [Hz]
+    input  wire         [ 3:0] build_axes,                // what is built: axes
+    input  wire         [ 3:0] build_address,             // what is built: address
+    input  wire         [ 7:0] build_memory,              // what is built: memory [1024 byte]
     // SCOPE_WORDS: words of the recorder of ticks; 0: there is none, and no excitation
     input  wire         [ 8:0] build_scope,
     // cycles since reset; every time stamp is a part of it [cycle]
@@ -34,33 +34,41 @@ module node_registers (
     output logic               heartbeat_kick,
     // axes that start, bit n: axis n; they play their queued segments from the same tick on
     output logic        [ 7:0] start_axes,
-    output logic               start_axes_written,       // strobe: new value
+    output logic               start_axes_written,        // strobe: new value
     // longest wait of the soft core; writing lets its next access to a register wait for this time,
     // or until a word of the bus is received [cycle]
     output logic        [23:0] wait_time,
-    output logic               wait_time_written,        // strobe: new value
-    output logic        [ 2:0] scope_axis,               // number of the axis
-    // bit n: 0 sine and cosine, 1 target, 2 target velocity, 3 velocity, 4 error, 5 command
-    output logic        [ 5:0] scope_signals,
-    output logic        [15:0] scope_samples_length,     // samples
+    output logic               wait_time_written,         // strobe: new value
+    output logic        [ 2:0] scope_axis,                // number of the axis
+    output logic        [ 9:0] scope_signals,             // bit n: tick_signal n
+    output logic        [ 3:0] scope_trigger,             // tick_signal that triggers
+    output logic        [ 2:0] scope_mode,                // tick_trigger
+    // samples; 0: no end, and they are read while it goes on
+    output logic        [15:0] scope_samples_length,
     // from sample to sample; 0 acts as 1 [tick]
     output logic        [15:0] scope_samples_every,
-    // strobe: begins a recording, at the first value of a waveform that runs
-    output logic               scope_state_start,
-    input  wire                scope_state_recording,    // it is not complete
-    input  wire                scope_state_full,         // it is complete
-    // word of the recording; reading advances to the next one
-    input  wire         [31:0] scope_word,
-    output logic               scope_word_read,          // strobe: read in this cycle
-    input  wire         [31:0] tick_count,               // servo ticks since reset; wraps [tick]
-    output logic        [ 2:0] excitation_axis,          // number of the axis
+    // samples from before the trigger, less than length
+    output logic        [15:0] scope_place_earlier,
+    // from the trigger to the first sample, which also waits for the first value of a waveform; 0:
+    // the sample of the trigger [tick]
+    output logic        [15:0] scope_place_delay,
+    // level of the trigger; writing begins a recording
+    output logic signed [31:0] scope_level,
+    output logic               scope_level_written,       // strobe: new value
+    input  wire         [31:0] tick_count,                // servo ticks since reset; wraps [tick]
+    output logic        [ 2:0] excitation_axis,           // number of the axis
     // values of the waveform, one for each tick, 4096 at most; 0: nothing is added [tick]
     output logic        [12:0] excitation_period,
     // largest |command| with it, full scale 2^15
     output logic        [14:0] excitation_limit,
-    output logic signed [15:0] excitation_value,         // full scale 2^15
-    output logic        [11:0] excitation_value_at,      // its number
-    output logic               excitation_value_written  // strobe: new value
+    output logic signed [15:0] excitation_value,          // full scale 2^15
+    output logic        [11:0] excitation_value_at,       // its number
+    output logic               excitation_value_written,  // strobe: new value
+    input  wire         [ 1:0] scope_state_phase,         // scope_state
+    input  wire         [16:0] scope_state_available,     // words that can be read
+    // word of the recording; reading advances to the next one
+    input  wire         [31:0] scope_word,
+    output logic               scope_word_read            // strobe: read in this cycle
 );
     logic [31:0] time_stamp_high;
     logic        get_map_crc;
@@ -68,20 +76,20 @@ module node_registers (
     logic        get_build;
     logic        get_time_stamp;
     logic        get_time_stamp_high;
+    logic        get_tick_count;
     logic        get_scope_state;
     logic        get_scope_word;
-    logic        get_tick_count;
 
     wire         get = select && !write;
     wire         put = select && write;
     assign scope_word_read = get_scope_word;
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'hC94CC514) | ({32{get_clk_hz}} & clk_hz) |
+    assign rdata = ({32{get_map_crc}} & 32'h0DFDD864) | ({32{get_clk_hz}} & clk_hz) |
         ({32{get_build}} & {7'd0, build_scope, build_memory, build_address, build_axes}) |
         ({32{get_time_stamp}} & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high) |
-        ({32{get_scope_state}} & {29'd0, scope_state_full, scope_state_recording, 1'd0}) |
-        ({32{get_scope_word}} & scope_word) | ({32{get_tick_count}} & tick_count);
+        ({32{get_tick_count}} & tick_count) | ({32{get_scope_state}} & {13'd0,
+        scope_state_available, scope_state_phase}) | ({32{get_scope_word}} & scope_word);
 
     always_ff @(posedge clk) begin
         get_map_crc <= get && word == 6'h00;
@@ -89,9 +97,9 @@ module node_registers (
         get_build <= get && word == 6'h02;
         get_time_stamp <= get && word == 6'h04;
         get_time_stamp_high <= get && word == 6'h05;
-        get_scope_state <= get && word == 6'h0E;
-        get_scope_word <= get && word == 6'h0F;
         get_tick_count <= get && word == 6'h12;
+        get_scope_state <= get && word == 6'h1A;
+        get_scope_word <= get && word == 6'h1B;
         if (get_time_stamp) time_stamp_high <= time_stamp[63:32];
 
         if (put && word == 6'h06) tick_period <= wdata[23:0];
@@ -102,10 +110,15 @@ module node_registers (
         wait_time_written <= put && word == 6'h0A;
         if (put && word == 6'h0A) wait_time <= wdata[23:0];
         if (put && word == 6'h0C) scope_axis <= wdata[2:0];
-        if (put && word == 6'h0C) scope_signals <= wdata[8:3];
+        if (put && word == 6'h0C) scope_signals <= wdata[17:8];
+        if (put && word == 6'h0C) scope_trigger <= wdata[27:24];
+        if (put && word == 6'h0C) scope_mode <= wdata[30:28];
         if (put && word == 6'h0D) scope_samples_length <= wdata[15:0];
         if (put && word == 6'h0D) scope_samples_every <= wdata[31:16];
-        scope_state_start <= put && word == 6'h0E && wdata[0];
+        if (put && word == 6'h0E) scope_place_earlier <= wdata[15:0];
+        if (put && word == 6'h0E) scope_place_delay <= wdata[31:16];
+        scope_level_written <= put && word == 6'h0F;
+        if (put && word == 6'h0F) scope_level <= wdata[31:0];
         if (put && word == 6'h18) excitation_axis <= wdata[2:0];
         if (put && word == 6'h18) excitation_period <= wdata[15:3];
         if (put && word == 6'h18) excitation_limit <= wdata[30:16];
@@ -119,9 +132,9 @@ module node_registers (
             get_build <= 1'b0;
             get_time_stamp <= 1'b0;
             get_time_stamp_high <= 1'b0;
+            get_tick_count <= 1'b0;
             get_scope_state <= 1'b0;
             get_scope_word <= 1'b0;
-            get_tick_count <= 1'b0;
             time_stamp_high <= '0;
             tick_period <= 24'h000000;
             sample_period <= 16'h0000;
@@ -131,10 +144,15 @@ module node_registers (
             wait_time_written <= 1'b0;
             wait_time <= 24'h000000;
             scope_axis <= 3'h0;
-            scope_signals <= 6'h00;
+            scope_signals <= 10'h000;
+            scope_trigger <= 4'h0;
+            scope_mode <= 3'h0;
             scope_samples_length <= 16'h0001;
             scope_samples_every <= 16'h0001;
-            scope_state_start <= 1'b0;
+            scope_place_earlier <= 16'h0000;
+            scope_place_delay <= 16'h0000;
+            scope_level_written <= 1'b0;
+            scope_level <= 32'h00000000;
             excitation_axis <= 3'h0;
             excitation_period <= 13'h0000;
             excitation_limit <= 15'h0000;

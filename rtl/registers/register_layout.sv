@@ -14,6 +14,7 @@
 module register_layout #(
     parameter int AXES = 1,  // axes of the node, 1 to 8
     parameter int FILTERS = 255,  // bit n: axis n has it, else its settings are 0
+    parameter int HAS_BACKLASH = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_BRIDGE = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_COMPARE = 255,  // bit n: axis n has it, else its settings are 0
     parameter int HAS_DAC = 255,  // bit n: axis n has it, else its settings are 0
@@ -49,6 +50,7 @@ module register_layout #(
     logic              sign;
     logic [PLACES-1:0] slot;
     wire               filters = 1'(FILTERS >> axis);
+    wire               has_backlash = 1'(HAS_BACKLASH >> axis);
     wire               has_bridge = 1'(HAS_BRIDGE >> axis);
     wire               has_compare = 1'(HAS_COMPARE >> axis);
     wire               has_dac = 1'(HAS_DAC >> axis);
@@ -117,8 +119,8 @@ module register_layout #(
         case (entry)
             9'h006, 9'h090: mask = 32'h00FFFFFF;
             9'h007, 9'h013, 9'h04C, 9'h084, 9'h099: mask = 32'h0000FFFF;
-            9'h00C: mask = 32'h000001FF;
-            9'h00D, 9'h010, 9'h014, 9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
+            9'h00C: mask = 32'h7F03FF07;
+            9'h00D, 9'h00E, 9'h00F, 9'h010, 9'h014, 9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
             9'h011, 9'h015, 9'h050, 9'h102: mask = 32'h000000FF;
             9'h018: mask = 32'h7FFFFFFF;
             9'h040, 9'h08A, 9'h08F, 9'h100: mask = 32'h000FFFFF;
@@ -155,6 +157,8 @@ module register_layout #(
             9'h123, 9'h124: mask = (has_compare ? 32'h00FFFFFF : 32'd0);
             9'h127: mask = (has_velocity ? 32'h0000FFFF : 32'd0);
             9'h12B: mask = 32'h00000007;
+            9'h136: mask = (has_backlash ? 32'h00FFFFFF : 32'd0);
+            9'h137: mask = (has_backlash ? 32'hFFFFFFFF : 32'd0);
             9'h141: mask = (has_bridge ? 32'h0000FFFF : 32'd0);
             9'h142, 9'h143: mask = (has_stepper ? 32'h0FFFFFFF : 32'd0);
             9'h144: mask = (has_stepper ? 32'h0000000F : 32'd0);

@@ -22,6 +22,14 @@ ON_BOARD = {
     "flash_miso": "in",
 }
 FLASH = tuple(name for name in ON_BOARD if name.startswith("flash"))
+# pads of an Ethernet PHY, by the interface: how many, and their direction
+ETHERNET = {
+    "rgmii": {
+        **{"rx_clk": (1, "in"), "rx_ctl": (1, "in"), "rx_data": (4, "in")},
+        **{"tx_clk": (1, "out"), "tx_ctl": (1, "out"), "tx_data": (4, "out")},
+    },
+}
+ETHERNET_HZ = 125_000_000  # of its clock
 PULLS = ("up", "down", "none")
 DIRECTIONS = ("both", "in", "out")
 
@@ -55,6 +63,15 @@ class Loader:
 
 
 @dataclass(frozen=True)
+class Ethernet:
+    """The PHY of a board."""
+
+    interface: str
+    pads: dict[str, Pad]  # by the port of the top
+    ports: dict[str, str]  # {pads of the Ethernet core: ports of the top}
+
+
+@dataclass(frozen=True)
 class Board:
     """A board file that has been checked by itself."""
 
@@ -71,6 +88,7 @@ class Board:
     node_hz: int
     pll_pad: bool  # the pin of the clock is an input of the PLL itself
     on_board: dict[str, Pad]
+    ethernet: Ethernet | None
     address: list[Pad]  # switches, bit 0 first
     leds: dict[str, Pad]
     leds_low: bool  # True: a LED is on when its pin is low
@@ -83,6 +101,7 @@ class Board:
     def pads(self) -> Iterator[Pad]:
         yield self.clock
         yield from self.on_board.values()
+        yield from self.ethernet.pads.values() if self.ethernet else ()
         yield from self.address
         yield from self.leds.values()
         for pins in self.connectors.values():
@@ -135,6 +154,31 @@ def pull_of(table: Table) -> str:
     if pull not in PULLS:
         raise table.misfit(f"pull {pull!r} is none of {', '.join(PULLS)}")
     return pull
+
+
+def ethernet_of(table: Table) -> Ethernet | None:
+    """The PHY of [ethernet]; None if there is no such table."""
+    if not table.left:
+        return None
+    interface = table.take("interface", str)
+    if interface not in ETHERNET:
+        raise table.misfit(f"interface {interface!r} is none of {', '.join(ETHERNET)}")
+    pads: dict[str, Pad] = {}
+    ports: dict[str, str] = {}
+    for name, (count, direction) in ETHERNET[interface].items():
+        balls = table.words(name)
+        if len(balls) != count:
+            raise table.misfit(f"{name} must name {count} pin{'s' * (count > 1)}")
+        numbered = [f"eth_{name}" + (f"_{n}" if count > 1 else "") for n in range(count)]
+        pads |= {
+            port: Pad(ball, f"PHY {name}", direction)
+            for port, ball in zip(numbered, balls, strict=True)
+        }
+        inside = {"rx_clk": "clocks_rx", "tx_clk": "clocks_tx"}.get(name, f"pads_{name}")
+        joined = ", ".join(reversed(numbered))
+        ports[inside] = f"{{{joined}}}" if count > 1 else joined
+    table.close()
+    return Ethernet(interface, pads, ports)
 
 
 def connector_of(table: Table, name: str, buffer: str) -> dict[str, Pad]:
@@ -221,6 +265,7 @@ def load(path: Path) -> Board:
             )
             for name in list(on_board.left)
         },
+        ethernet=ethernet_of(table.table("ethernet")),
         address=[
             Pad(ball, f"switch {n}", "in", pull=switch_pull)
             for n, ball in enumerate(switches.words("pins"))

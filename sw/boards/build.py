@@ -14,6 +14,7 @@ python -m boards.build --board x --machine y [--only-files | --firmware]
 import argparse
 import hashlib
 import json
+import shutil
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from boards import board as boards
+from boards import ethernet
 from boards import machine as machines
 from boards.block_ram import ContentsError
 from boards.board import Board
@@ -36,6 +38,7 @@ from firmware import build as firmware
 
 OUT = ROOT / "build" / "boards"
 NOTE = "note"  # of what the bitstream in a folder was made of
+FLIP_FLOPS = "+/ecp5/cells_sim.v"  # primitives of the Ethernet core besides those of the family
 PLACED, FILLED = "placed", "filled"  # files of nextpnr: with the placeholder, with the firmware
 KINDS = {  # of cells of a 7-series part, by the beginning of their names
     "LUT": "LUT",
@@ -76,6 +79,10 @@ def write(design: Design) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files(design).items():
         (folder / name).write_text(text, encoding="utf-8")
+    if design.ethernet:
+        board = design.board
+        made = ethernet.core(design.ethernet.interface, board.part.family.name, board.node_hz)
+        shutil.copyfile(made, folder / made.name)
     return folder
 
 
@@ -106,7 +113,11 @@ def synthesise(design: Design, folder: Path) -> Path:
     part, family = design.board.part, design.board.part.family
     written = family.netlist.replace("{folder}", str(folder.relative_to(ROOT)))
     last = f"{family.synthesis} {part.synthesis} -top {{top}} {written}"
-    return yosys(folder / "top.sv", {}, last, f"board-{design.name}", family.read_cells)
+    first = family.read_cells
+    if design.ethernet:
+        core = (folder / f"{ethernet.NAME}.v").relative_to(ROOT)
+        first += f"; read_verilog -lib {FLIP_FLOPS}; read_verilog {core}"
+    return yosys(folder / "top.sv", {}, last, f"board-{design.name}", first)
 
 
 def placer(design: Design) -> Placer:

@@ -4,11 +4,12 @@
 from dataclasses import dataclass, replace
 
 from boards import clocks, size
-from boards.board import FLASH, Board, Pad
+from boards.board import FLASH, Board, Ethernet, Pad
 from boards.machine import DRIVES, FEATURES, PERIPHERALS, Between, Machine, Signal, Wiring
 from boards.toml_file import Misfit, TooLarge
 
 TICK_HZ = 4000  # servo tick that the firmware sets
+ETHERNET_LINK = {"HAS_LINK": 1, "LINK_UDP": 1}
 PLACEHOLDER = "placeholder"  # of the firmware; the name of its file
 
 
@@ -42,6 +43,11 @@ class Design:
     @property
     def name(self) -> str:
         return f"{self.board.name}-{self.machine.name}"
+
+    @property
+    def ethernet(self) -> Ethernet | None:
+        """The PHY, if the machine has its link over Ethernet."""
+        return self.board.ethernet if self.machine.ip_address else None
 
     @property
     def in_block_ram(self) -> bool:
@@ -85,6 +91,7 @@ def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
         **{name: mask(machine, drive) for drive, name in DRIVES.items()},
         **{name: mask(machine, feature) for feature, (name, _) in FEATURES.items()},
         **{name: int(each in machine.peripherals) for each, name in PERIPHERALS.items()},
+        **(ETHERNET_LINK if machine.ip_address else {}),
         "HAS_SERIAL_CORE": int(machine.core == "serial"),
         "MEMORY_BYTES": 1024 * machine.memory_kib,
         "PROGRAM_BYTES": 32768,
@@ -194,6 +201,7 @@ def used_on_board(board: Board, machine: Machine) -> list[Pad]:
     return [
         board.clock,
         *(pad for name, pad in board.on_board.items() if machine.has_flash or name not in FLASH),
+        *(board.ethernet.pads.values() if board.ethernet and machine.ip_address else []),
         *board.address,
         *board.leds.values(),
     ]
@@ -221,6 +229,15 @@ def check_bus(board: Board, machine: Machine) -> None:
     on_usb = "usb_rx" in board.on_board and "usb_tx" in board.on_board
     if not on_usb and "rs485_rx" in [*machine.unused, *wiring_for(board, machine).unused]:
         raise Misfit(f"{machine.file}: {board.file} has no USB serial port: connect rs485_rx")
+
+
+def check_ethernet(board: Board, machine: Machine) -> None:
+    """Refuses a link over Ethernet on a board whose PHY is not known."""
+    if machine.ip_address and not board.ethernet:
+        raise Misfit(
+            f"{machine.file}: [node.ethernet] needs a board with an Ethernet PHY, and {board.file} "
+            "has no [ethernet]"
+        )
 
 
 def check_part(board: Board, machine: Machine, needed: size.Size) -> None:
@@ -265,6 +282,7 @@ def fit(board: Board, machine: Machine) -> Design:
         check_enable(board, machine, one)
         check_volts(board, machine, one)
     check_bus(board, machine)
+    check_ethernet(board, machine)
     needed = size.estimate(board.part.family.name, machine)
     check_part(board, machine, needed)
     pll = clocks.pll(board.part.family.plls, board.clock_hz, board.node_hz, board.file)

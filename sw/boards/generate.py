@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from boards import block_ram
-from boards.board import FLASH, LEDS, Pad
+from boards.board import ETHERNET_HZ, FLASH, LEDS, Pad
 from boards.fit import PLACEHOLDER, Connection, Design
 from boards.machine import AXIS_SIGNALS, NODE_SIGNALS, PERIPHERALS, RELAY_SIGNALS
 from moire.analysis.loopback import GROUND, PLUG
@@ -25,10 +25,15 @@ TEMPLATES = Environment(
 )
 NODE_OUTPUTS = (  # besides those of the axes
     *("rs485_tx", "rs485_driver_enable", "flash_cs_n", "flash_sclk", "flash_mosi"),
-    *("link_tx", "link_driver_enable"),
+    *("link_tx", "link_driver_enable", "udp_rx_ready", "udp_tx_valid", "udp_tx_last"),
     *("i2c_scl_low", "i2c_sda_low", "keyboard_clock_low", "keyboard_data_low", "edm_clock_low"),
     *("edm_data_low", "peer_tx", "display_cs_n", "display_sclk", "display_data"),
 )
+UDP_OUTPUTS = {"udp_tx_data": 8, "udp_tx_receiver": 48, "udp_tx_length": 16}
+UDP_INPUTS = {  # from the Ethernet core, and their bits
+    **{"udp_rx_valid": 1, "udp_rx_data": 8, "udp_rx_last": 1, "udp_rx_error": 1},
+    **{"udp_rx_sender": 48, "udp_tx_ready": 1},
+}
 RELAY_OUTPUTS = (
     *("relay_a", "relay_b", "relay_z", "correcting", "fault", "rs485_tx", "rs485_driver_enable"),
     *("flash_chip_n", "flash_sclk", "flash_sdo"),
@@ -68,6 +73,12 @@ def pins(design: Design) -> list[Pin]:
             timed = name == "flash_miso" and not design.machine.orders
             timing = ", synchronous to flash_sclk" if timed else ""
             found.append(Pin(name, pad.direction, pad, f"pin {pad.ball}{timing}"))
+    if design.ethernet:
+        clock = "synchronous to eth_rx_clk, of the Ethernet PHY"
+        found += [
+            Pin(port, pad.direction, pad, f"pin {pad.ball}, {clock}")
+            for port, pad in design.ethernet.pads.items()
+        ]
     found += [
         Pin(f"address_{n}", "in", pad, f"static: switch, bit {n} of the address on the bus")
         for n, pad in enumerate([] if design.machine.orders else board.address)
@@ -89,7 +100,7 @@ def outputs(design: Design) -> dict[str, int]:
         return dict.fromkeys(RELAY_OUTPUTS, 1)
     axes = len(design.machine.axes)
     found = {name: axes for name, signal in AXIS_SIGNALS.items() if signal.direction == "out"}
-    return found | dict.fromkeys(NODE_OUTPUTS, 1)
+    return found | dict.fromkeys(NODE_OUTPUTS, 1) | UDP_OUTPUTS
 
 
 def inputs(design: Design) -> dict[str, str]:
@@ -125,6 +136,10 @@ def inputs(design: Design) -> dict[str, str]:
             name: ports.get(name, f"1'b{signal.idle}")
             for name, signal in NODE_SIGNALS.items()
             if signal.needs in PERIPHERALS and signal.direction != "out" and name not in EDM_STATUS
+        },
+        **{
+            name: f"ethernet_{name}" if design.ethernet else f"{bits}'d0"
+            for name, bits in UDP_INPUTS.items()
         },
         "edm_status": "{" + ", ".join(ports.get(name, "1'b0") for name in EDM_STATUS) + "}",
     }
@@ -269,6 +284,8 @@ def top(design: Design) -> str:
         outputs=outputs(design),
         inputs=inputs(design),
         assigned=assigned(design),
+        udp_inputs=UDP_INPUTS,
+        udp_outputs=[name for name in outputs(design) if name.startswith("udp")],
         literal=literal,
     )
 
@@ -297,7 +314,7 @@ def files(design: Design) -> dict[str, str]:
         **more,
         "top.sv": top(design),
         constraints: TEMPLATES.get_template(f"{constraints}.jinja").render(
-            d=design, pins=pins(design)
+            d=design, pins=pins(design), ethernet_hz=ETHERNET_HZ
         ),
         "wiring.svg": svg(design),
         "wiring.html": page(design),

@@ -3,6 +3,7 @@
 between them and the board, and of the pins that they are on.
 """
 
+import ipaddress
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +51,8 @@ FEATURES = {  # of an axis: its parameter of rtl/node.sv, and the feature that i
     "velocity": ("HAS_VELOCITY", ""),
     "filters": ("HAS_FILTERS", "drive"),
     "fine_stage": ("HAS_FINE_STAGE", "dac"),
+    "set_points": ("HAS_SET_POINTS", "drive"),
+    "backlash": ("HAS_BACKLASH", "drive"),
 }
 AXIS_SIGNALS = {
     "encoder_a": Signal("in", "encoder", "A of the scale"),
@@ -110,6 +113,8 @@ SIGNALS = AXIS_SIGNALS | NODE_SIGNALS | RELAY_SIGNALS
 GROUPS = sorted({signal.group for signal in SIGNALS.values()})
 SCOPE_WORDS = [1 << n for n in range(8, 17)]  # of the recorder of ticks
 SCOPE_IMAGES = ("axis", "stream")  # whose firmware has its requests
+STREAM_IMAGES = ("stream", "steps_stream")  # whose firmware supervises set-points
+LOCAL_MAC = 0x024D  # the first two bytes of MAC addresses that we choose ourselves
 MOST_ORDERS = 16  # of a relay whose timing and size are known
 
 
@@ -172,6 +177,7 @@ class Machine:
     scope_words: int  # memory of the recorder of ticks; 0: none
     axes: list[Axis]
     peripherals: list[str]
+    ip_address: str  # of the real-time link over Ethernet; empty: it is not over Ethernet
     unused: list[str]  # signals of the node that are not connected
     wiring: dict[str, Wiring]  # by layout
 
@@ -185,6 +191,16 @@ class Machine:
     def module(self) -> str:
         """The module of rtl/ that it is."""
         return "relay" if self.orders else "node"
+
+    @property
+    def ip_number(self) -> int:
+        """The IP address as a number of 32 bits."""
+        return int(ipaddress.IPv4Address(self.ip_address))
+
+    @property
+    def mac_address(self) -> int:
+        """The MAC address as a number of 48 bits: locally administered, of the IP address."""
+        return LOCAL_MAC << 32 | self.ip_number
 
     @property
     def has_flash(self) -> bool:
@@ -241,6 +257,21 @@ def check_front_end(table: Table, group: str, between: Between) -> None:
     if not set(between.volts) <= set(found.volts):
         levels = " or ".join(f"{volts:g}" for volts in found.volts)
         raise table.misfit(f"the front end {found.name} has {levels} V at the board")
+
+
+def ip_address_of(table: Table) -> str:
+    """The address of [node.ethernet]; empty if there is no such table."""
+    if not table.left:
+        return ""
+    found = table.take("address", str)
+    table.close()
+    try:
+        address = ipaddress.IPv4Address(found)
+    except ValueError:
+        raise table.misfit(f"address {found!r} is no IP address such as 192.168.1.50") from None
+    if address.is_multicast or address.is_unspecified or address.is_loopback or address.is_reserved:
+        raise table.misfit(f"address {found!r} is none that a node may have")
+    return found
 
 
 def between_of(table: Table) -> dict[str, Between]:
@@ -307,6 +338,11 @@ def check(machine: Machine) -> None:
                 f"{file}: [node] {feature} = {size}, but "
                 f"{f'axis {with_it[0]} has' if with_it else 'no axis has'} the feature {feature}"
             )
+    if machine.ip_address and "link" in machine.peripherals:
+        raise Misfit(
+            f"{file}: [node.ethernet] is the real-time link over Ethernet: the peripheral link is "
+            "the one over a serial line, and a node has one of them"
+        )
     if machine.scope_words and machine.scope_words not in SCOPE_WORDS:
         raise Misfit(
             f"{file}: [node] scope_words = {machine.scope_words} must be 0 or a power of two from "
@@ -316,6 +352,12 @@ def check(machine: Machine) -> None:
         raise Misfit(
             f"{file}: [node] scope_words needs image {' or '.join(SCOPE_IMAGES)}: "
             f"{machine.image} does not record ticks"
+        )
+    followers = [axis.name for axis in machine.axes if "set_points" in axis.features]
+    if followers and machine.image not in STREAM_IMAGES:
+        raise Misfit(
+            f"{file}: the feature set_points of axis {followers[0]} needs image "
+            f"{' or '.join(STREAM_IMAGES)}: {machine.image} does not play streams"
         )
 
 
@@ -358,6 +400,7 @@ def load(path: Path) -> Machine:
         scope_words=0 if is_relay else kind.take("scope_words", int, 0),
         axes=[axis_of(row) for row in table.rows("axis")],
         peripherals=[] if is_relay else kind.chosen("peripherals", PERIPHERALS),
+        ip_address="" if is_relay else ip_address_of(kind.table("ethernet")),
         unused=kind.chosen("unused", RELAY_SIGNALS if is_relay else NODE_SIGNALS),
         wiring={layout: wiring_of(layouts.table(layout), between) for layout in list(layouts.left)},
     )

@@ -19,14 +19,19 @@ FEATURES = {
     "capture": 280,
     "encoder_check": 190,
     "recorder": 100,
+    "backlash": 638,
 }
 STEPPER = 730  # in an axis that has another drive
 PERIPHERALS = 3033  # all six (docs/peripherals.md); one alone was not measured
+LINK = 1296  # the real-time link
+ETHERNET = 4837  # core of LiteEth for RGMII, as synthesised
+SET_POINTS, SET_POINTS_AXIS = 3827, 353  # of the first axis that has them, of each further one
 # Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of ten nodes)
 MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
 SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
+ETHERNET_RAM = 4  # core of LiteEth for RGMII and the link
 SCOPE_STEP_WORDS, WAVEFORM = 512, 4  # recorder of ticks: words of a block; its excitation
 # On an iCE40: the node of four axes that count in logic cells, the LUT4 by which netlists of four
 # and three of them differ, and the queue of an axis' captures
@@ -73,6 +78,7 @@ def ecp5_block_ram(machine: Machine) -> int:
     found += own + -(-(count("harmonics") - own) // HARMONICS_AXES)
     if count("velocity"):
         found += MICROCODE + ENGINE * -(-len(axes) // ENGINE_AXES)
+    found += ETHERNET_RAM * bool(machine.ip_address)
     if machine.scope_words:
         found += -(-machine.scope_words // SCOPE_STEP_WORDS) + WAVEFORM
     return found
@@ -94,7 +100,11 @@ def estimate(family: str, machine: Machine) -> Size:
     block_ram = ecp5_block_ram(machine)
     if family == "xc7":  # twice as large
         block_ram = -(-block_ram // 2)
-    shared += PERIPHERALS * bool(machine.peripherals)
+    shared += PERIPHERALS * any(name != "link" for name in machine.peripherals)
+    shared += LINK * ("link" in machine.peripherals or bool(machine.ip_address))
+    shared += ETHERNET * bool(machine.ip_address)
+    if followers := sum(axis.has("set_points") for axis in axes):
+        shared += SET_POINTS + (followers - 1) * SET_POINTS_AXIS
     return Size(shared + sum(map(axis_lut, axes)), block_ram)
 
 

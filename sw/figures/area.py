@@ -78,7 +78,13 @@ OF_BOTH: dict[str, Parameters] = {
     "segment table of 255": {"SEGMENTS": 255},
     "two biquads": {"FILTERS": 2},
 }
-OF_STEP_AXES: dict[str, Parameters] = {**OF_BOTH, "bridge": {"HAS_BRIDGE": ALL_AXES}}
+OF_STEP_AXES: dict[str, Parameters] = {
+    **OF_BOTH,
+    "bridge": {"HAS_BRIDGE": ALL_AXES},
+    "set-points": {"HAS_SET_POINTS": ALL_AXES},
+    "compensation of backlash": {"HAS_BACKLASH": ALL_AXES},
+    "real-time link": {"HAS_LINK": 1},
+}
 OF_SINE_AXES: dict[str, Parameters] = {
     **OF_BOTH,
     "signal monitor": {"HAS_MONITOR": ALL_AXES},

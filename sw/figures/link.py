@@ -4,18 +4,24 @@ how fast is it with eight axes.
 
 The bad packets go into the Verilated process_link (link_run.cpp). A packet counts as acted upon
 when it causes an access of the register bus or a reply, or when it is not counted as refused
-exactly once. The times are those of a whole simulated node of 60 MHz, with its firmware.
+exactly once. The times are those of a whole simulated node of 60 MHz, with its firmware; those over
+Ethernet of one of 50 MHz with LiteEth (`make litex`).
 """
 
 from functools import cache
 from pathlib import Path
+from typing import cast
 
-from figures.common import Figure, Quick, bar, console, shares
+from embed.litex_parts import is_there
+from figures.common import Absent, Figure, Quick, bar, console, shares
+from figures.ethernet import BYTE_S, GAP_BYTES, EthernetHost, EthernetNode, frame_bytes
+from figures.ethernet import CLK_HZ as ETHERNET_CLK_HZ
 from figures.synthesis import ELABORATED, elaborated, lut4s, netlist_of, source_of
 from moire.bus.cobs import PacketReader, sealed
 from moire.bus.link_gateway import LONGEST_STUFFED
 from moire.client.bus import Bus
 from moire.client.link import ProcessData
+from moire.client.node import Node as ClientNode
 from moire.errors import MoireError
 from twin import Axis, Node, Twin, TwinTransport
 from twin.build import ROOT, run, simulation
@@ -24,6 +30,7 @@ from twin.nodes.twin import drives
 TOP = "process_link"
 RTL = ROOT / "rtl" / "link" / f"{TOP}.sv"
 DRIVER = Path(__file__).with_name("link_run.cpp")
+DATAGRAM_BENCH = DRIVER.with_name("datagram_bench.sv")
 PACKETS = 10**6
 SHARE = 10**5  # of one run, each with a seed of its own
 
@@ -100,18 +107,63 @@ def link_rs485_khz(cycles: int = 20, axes: int = AXES, seed: int = 1) -> float:
 
 
 @cache
-def program() -> Path:
-    return simulation(DRIVER, RTL)
+def ethernet_times(cycles: int, axes: int) -> tuple[float, float]:
+    """As `cycle_times`, over Ethernet at 100 Mbit/s: from the first nibble of a request to that of
+    the next one, and from the last nibble of a request to the first one of its reply. Meanwhile the
+    soft core does nothing but read registers, one after the other.
+    """
+    if not is_there():
+        raise Absent("LiteX, which makes the Ethernet core, is not set up: make litex")
+    node = EthernetNode(axes)
+    host = EthernetHost(node)
+    link = DATA.set_up(cast(ClientNode, node), watchdog_s=0)
+    if link.reply(host.exchange(link.request(0, [0] * link.writes))) is None:
+        raise MoireError("the first request has no good reply")
+    node.occupy_bus()
+    whole, inside = [], []
+    for _ in range(cycles):
+        request = link.request(0, [0] * link.writes)
+        packet = host.exchange(request)
+        reply = link.reply(packet)
+        if reply is None or any(reply.refused.values()):
+            raise MoireError(f"no good reply over Ethernet: {reply}")
+        took = node.reply_at - node.sent_at
+        on_wire = frame_bytes(request) + frame_bytes(packet)
+        inside.append(took / ETHERNET_CLK_HZ)
+        whole.append(inside[-1] + on_wire * BYTE_S)
+        measured = (node.replied_at - node.began_at) / ETHERNET_CLK_HZ + 2 * GAP_BYTES * BYTE_S
+        if abs(measured - whole[-1]) > 1e-6:
+            raise MoireError(f"a cycle took {measured} s, calculated from bytes {whole[-1]} s")
+    console.print(
+        f"{axes} axes over Ethernet, {on_wire} bytes on the wire: {1e6 * max(whole):.1f} us, "
+        f"{1e6 * max(inside):.1f} us without the wire"
+    )
+    return max(whole), max(inside)
+
+
+def link_udp_us(cycles: int = 20, axes: int = AXES) -> float:
+    return 1e6 * ethernet_times(cycles, axes)[1]
+
+
+def link_udp_khz(cycles: int = 20, axes: int = AXES) -> float:
+    return 1e-3 / ethernet_times(cycles, axes)[0]
+
+
+@cache
+def program(top: Path) -> Path:
+    return simulation(DRIVER, top)
 
 
 def link_wrong_accepted(count: int = PACKETS, seed: int = 1) -> float:
     tried = wrong = missed = 0
-    with bar(f"{count:.0e} packets") as progress:
-        task = progress.add_task("", total=count)
-        for size, number in shares(count, SHARE, seed):
-            found = [int(word) for word in run([program(), size, number], "link_run").split()]
-            tried, wrong, missed = tried + found[0], wrong + found[1], missed + found[2]
-            progress.advance(task, size)
+    with bar(f"{count:.0e} packets, and as many datagrams") as progress:
+        task = progress.add_task("", total=2 * count)
+        for top in (RTL, DATAGRAM_BENCH):
+            for size, number in shares(count, SHARE, seed):
+                words = run([program(top), size, number], "link_run").split()
+                found = [int(word) for word in words]
+                tried, wrong, missed = tried + found[0], wrong + found[1], missed + found[2]
+                progress.advance(task, size)
     console.print(
         f"{tried} bad packets, {wrong} acted upon or not counted; "
         f"of the good ones between them {missed} refused"
@@ -135,8 +187,8 @@ FIGURES = {
     "link_wrong_accepted": Figure(
         link_wrong_accepted,
         "packets",
-        "of 10^6 damaged, foreign, replayed, truncated or hostile packets to the real-time link: "
-        "acted upon",
+        "of 10^6 damaged, foreign, replayed, truncated or hostile packets to the real-time link, "
+        "and of as many UDP datagrams: acted upon",
         "0",
         Quick({"count": 2000}, "2000 packets"),
         0,
@@ -159,6 +211,24 @@ FIGURES = {
         "<= 20",
         SHORT,
         0,
+    ),
+    "link_udp_us": Figure(
+        link_udp_us,
+        "us",
+        "the same over Ethernet: from the end of a frame in to the begin of the frame out, at "
+        "50 MHz, while the soft core does nothing but read registers; LiteEth included",
+        "<= 10",
+        SHORT,
+        0,
+    ),
+    "link_udp_khz": Figure(
+        link_udp_khz,
+        "kHz",
+        "cycles for these 8 axes over UDP at 100 Mbit/s, one after the other, with all bytes of "
+        "the frames and the gaps between them",
+        ">= 8",
+        SHORT,
+        2,
     ),
     "link_usb_khz": Figure(
         link_usb_khz,

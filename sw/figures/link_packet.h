@@ -22,6 +22,8 @@ constexpr uint32_t REPLY_WORDS = 5;
 constexpr uint32_t REPLY_END_SPARE_VALUE = 0;
 constexpr uint32_t REPLY_END_WORDS = 1;
 constexpr uint32_t FRAME_WORDS = 6;
+constexpr uint32_t REPLY_FRAME_WORDS = 7;
 constexpr uint32_t LONGEST_WORDS = 128;
 constexpr uint32_t MOST_VALUES = 121;
+constexpr uint32_t UDP_PORT = 27181;
 }  // namespace link_packet

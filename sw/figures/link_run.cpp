@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // link_run -- send damaged, foreign, replayed, truncated and hostile packets to the Verilated
-// process_link, with good ones between them.
+// process_link, with good ones between them; or as datagrams to datagram_bench, from its host and,
+// while a drive is on, from others.
 //
 //   link_run COUNT SEED      prints: bad packets sent, bad ones acted upon or not counted once,
 //   good
@@ -9,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "figures/common.h"
@@ -23,7 +25,29 @@ using Bytes = std::vector<uint8_t>;
 
 constexpr uint32_t SESSION = 0x5A17C3, WINDOW = 60'000;
 constexpr uint32_t WRITES = 9, READS = 4;
-constexpr int GOOD_EACH = 8;  // one good packet after so many bad ones
+constexpr uint32_t REPLY_BYTES = 4 * (READS + link_packet::REPLY_FRAME_WORDS);
+constexpr int GOOD_EACH = 8;               // one good packet after so many bad ones
+constexpr uint64_t HOST = 0xC0A801010FA0;  // address and port of a datagram
+
+// The carrier of a Verilated top: a datagram ends with its last byte, and has a sender.
+template <class Pins, class = void>
+constexpr bool DATAGRAMS = false;
+template <class Pins>
+constexpr bool DATAGRAMS<Pins, std::void_t<decltype(Pins::rx_last)>> = true;
+
+template <class Pins>
+void set_end(Pins& pins, bool last, uint64_t sender) {
+    if constexpr (DATAGRAMS<Pins>) pins.rx_last = last, pins.sender = sender, pins.locked = 1;
+}
+template <class Pins>
+void set_ends(Pins& pins, bool ends) {
+    if constexpr (!DATAGRAMS<Pins>) pins.rx_ends = ends;
+}
+template <class Pins>
+bool misses(const Pins& pins, uint64_t host) {  // a reply has another receiver or length
+    if constexpr (DATAGRAMS<Pins>) return pins.receiver != host || pins.length != REPLY_BYTES;
+    return false;
+}
 
 struct Node {
     std::unique_ptr<VerilatedContext> context = std::make_unique<VerilatedContext>();
@@ -54,14 +78,15 @@ struct Node {
         for (int n = 0; n < 6; n++) sum += uint8_t(pins->refused >> 8 * n);
         return sum;
     }
-    void send(const Bytes& bytes, int broken_at = -1) {
+    void send(const Bytes& bytes, int broken_at = -1, uint64_t sender = HOST) {
         for (size_t n = 0; n < bytes.size(); n++) {
+            set_end(*pins, n + 1 == bytes.size(), sender);
             pins->rx_valid = 1, pins->rx_data = bytes[n], pins->rx_broken = int(n) == broken_at;
             cycle();
         }
         pins->rx_valid = pins->rx_broken = 0;
-        pins->rx_ends = 1, cycle();
-        pins->rx_ends = 0;
+        set_ends(*pins, true), cycle();
+        set_ends(*pins, false);
         for (int n = 0; n < 4; n++) cycle();
     }
 };
@@ -96,13 +121,15 @@ int campaign(long count, uint64_t seed) {
         const uint64_t selects = node.selects, replies = node.replies;
         node.send(good);
         for (int n = 0; n < 2000 && node.pins->busy; n++) node.cycle();
-        missed += node.selects - selects != WRITES + READS + 1 || node.replies != replies + 1;
+        missed += node.selects - selects != WRITES + READS + 1 || node.replies != replies + 1 ||
+                  misses(*node.pins, HOST);
     };
     play_good();
     for (long n = 0; n < count; n++) {
         Bytes bad = packet(ours, sequence + 1, node.pins->now, WRITES, random);
         int broken_at = -1;
-        switch (random.below(11)) {
+        uint64_t sender = HOST;
+        switch (random.below(DATAGRAMS<Vtop> ? 12 : 11)) {
         case 0:  // up to 3 bits
             for (int k = 0; k <= int(n % 3); k++) {
                 const uint64_t bit = random.below(2 * bad.size()) + k * 2 * bad.size();
@@ -140,11 +167,13 @@ int campaign(long count, uint64_t seed) {
                          node.pins->now + uint32_t(random.from(WINDOW + 2000, 1LL << 31)), WRITES,
                          random);
             break;
-        default: broken_at = int(random.below(bad.size()));
+        case 10: broken_at = int(random.below(bad.size())); break;
+        default:  // a good one of another host
+            sender ^= 1ULL << random.below(48);
         }
         const uint64_t selects = node.selects, replies = node.replies;
         const uint32_t refused = node.refused();
-        node.send(bad, broken_at);
+        node.send(bad, broken_at, sender);
         const bool acted = node.selects != selects || node.replies != replies || node.pins->busy;
         wrong += acted || (node.refused() - refused) % 256 != 1;
         if (n % GOOD_EACH == 0) play_good();

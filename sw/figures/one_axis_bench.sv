@@ -60,6 +60,8 @@ module one_axis_bench (
     // the axis is number 1 of the chain, which serves the other converter first
     wire [1:0] chain_sampled, chain_rejected, chain_phase_valid, chain_done, chain_overspeed;
     wire [1:0] chain_disagreement, chain_lost;
+    wire [15:0] phase, fine_command;
+    wire [12:0] faults;
     wire [15:0] chain_plain_phase, chain_phase;
     wire signed [16:0] chain_step;
     wire               sample_overrun;
@@ -67,7 +69,6 @@ module one_axis_bench (
     wire compare_pulse, adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi;
 
     assign ready  = memory_ready && !waits;
-    assign target = u_axis.target;
     assign most_steps = 16'(1 << (u_axis.g_drive.u_actuator.g_stepper.u_steps.AHEAD_W - 2));
     assign rdata = live | feedback_rdata | actuator_rdata;
 
@@ -235,6 +236,10 @@ module one_axis_bench (
         .chain_overspeed   (chain_overspeed[1]),
         .chain_disagreement(chain_disagreement[1]),
         .chain_lost        (chain_lost[1]),
+        .target,
+        .phase,
+        .fine_command,
+        .faults,
         .encoder_a,
         .encoder_b,
         .encoder_z         (1'b0),
@@ -263,7 +268,7 @@ module one_axis_bench (
     };
     wire unused = &{
         1'b0, chain, address[1:0], tick_period[23:18], settings, result_axis, compare_pulse,
-        adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi
+        adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi, phase, fine_command, faults
     };
 endmodule
 

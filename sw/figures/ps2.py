@@ -57,7 +57,7 @@ def wrong_by_sigrok(count: int, seed: int) -> int:
     sequences.
     """
     if not shutil.which("sigrok-cli") or not RECORDING.exists():
-        raise BuildError(f"sigrok-cli (apt) and the recording {RECORDING} are needed")
+        raise BuildError(f"sigrok-cli (make sigrok) and the recording {RECORDING} are needed")
     with tempfile.TemporaryDirectory() as folder:
         samples = Path(folder) / "pass.bin"
         judged, heard = run(

@@ -46,6 +46,7 @@ IMAGES = {  # the image, its axes: its nodes
     ("stream", 1): "as `axis`, with [streams](stream.md)",
     ("stream", 8): "the same",
     ("steps", 8): "A/B/Z with drives, without sine and cosine",
+    ("steps_stream", 3): "as `steps`, with streams, for [LinuxCNC](linuxcnc.md)",
     ("counter", 4): "A/B/Z without drives: positions, index, scope",
     ("station", 2): "S4: table, job, panel, EEPROM",
 }

@@ -29,6 +29,9 @@ module three_axes_bench (
 
     for (genvar n = 0; n < 3; n++) begin : g_axis
         wire [31:0] actuator_rdata;
+        wire [47:0] target;
+        wire [15:0] phase, fine_command;
+        wire [12:0] faults;
         wire adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction, dac_cs_n, dac_sclk, dac_sdi;
         wire drive_enable, compare_pulse, line_stopped, step_made, step_down, moves, moved;
         wire block_up, block_down;
@@ -109,6 +112,10 @@ module three_axes_bench (
             .chain_overspeed   (1'b0),
             .chain_disagreement(1'b0),
             .chain_lost        (1'b0),
+            .target,
+            .phase,
+            .fine_command,
+            .faults,
             .select            (select[n]),
             .write,
             .word,
@@ -143,7 +150,7 @@ module three_axes_bench (
         );
 
         wire pins = &{1'b0, adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction};
-        wire dac = &{1'b0, dac_cs_n, dac_sclk, dac_sdi};
+        wire dac = &{1'b0, dac_cs_n, dac_sclk, dac_sdi, target, phase, fine_command, faults};
         wire engine = &{
             1'b0, position, step_made, step_down, moves, moved, moved_by, block_up, block_down,
             closed_loop, play, arm, controlled_stop, hold_target, pending

@@ -68,6 +68,7 @@ IMAGES = {
     "stream": Image(usual_axes=1, most_axes=8),
     "counter": Image(usual_axes=4, most_axes=8, drives=False),
     "steps": Image(usual_axes=8, most_axes=8),
+    "steps_stream": Image(usual_axes=3, most_axes=8),
     "station": Image(usual_axes=2, most_axes=2),
 }
 LARGEST_PARTS = 4  # that the message about a firmware that does not fit names
@@ -367,7 +368,9 @@ def main() -> None:
     parser.add_argument(
         "--axes",
         type=int,
-        help="axes of the node (default axis 1, stream 1, counter 4, steps 8, station 2)",
+        help="axes of the node (default "
+        + ", ".join(f"{name} {image.usual_axes}" for name, image in IMAGES.items())
+        + ")",
     )
     parser.add_argument(
         "--core", choices=sorted(CORES), default="soft", help="soft core (default soft)"

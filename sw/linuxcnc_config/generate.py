@@ -39,6 +39,10 @@ class Joint:
     rest: float  # where it moves after homing
     sequence: int  # in which it is homed
     following: float  # largest difference between command and position
+    backlash: float = 0.0  # of the screw, in um; not used for a rotary axis
+    take_up: float = 0.0  # how fast the motor takes it up, beyond the target, in mm/s
+    hysteresis: float = 0.0  # how far the target must come back until that is a reversal, in um
+    sensor: str = "table"  # the side of the backlash on which the sensor is, or "motor"
 
     @property
     def rotary(self) -> bool:
@@ -70,6 +74,19 @@ class Configuration:
         return self.delay_ms + 2 * self.period_ns * 1e-6
 
 
+def backlash_of(row: Table, table: Table) -> tuple[float, float]:
+    """The backlash of an axis in um, and the velocity in mm/s with which it is taken up."""
+    backlash, take_up = table.take("backlash_um", float, 0.0), table.take("take_up", float, 1.0)
+    if backlash < 0 or take_up <= 0:
+        raise table.misfit(
+            f"backlash_um {backlash:g} with take_up {take_up:g}: the first must not be below 0, "
+            "the second must be above 0"
+        )
+    if backlash and "backlash" not in row.left.get("features", []):
+        raise table.misfit("backlash_um needs the feature backlash of the axis")
+    return backlash, take_up
+
+
 def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     """The table [axis.linuxcnc] of an axis."""
     name, table = row.take("name", str), row.table("linuxcnc", True)
@@ -88,11 +105,26 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     rest = table.take("rest", float, 0.0)
     if not low <= rest <= high:
         raise table.misfit(f"rest {rest:g} is outside the travel, {low:g} to {high:g}")
+    backlash, take_up = backlash_of(row, table)
+    hysteresis = table.take("hysteresis_um", float, values["period_um"] / 16)
+    sensor = table.take("sensor", str, "table")
+    if sensor not in ("table", "motor"):
+        raise table.misfit(f"sensor {sensor!r} is none of table, motor")
     sequence = table.take("home_sequence", int, number)
     table.close()
     following = values["velocity"] * behind_ms * 1e-3 * MARGIN
     return Joint(
-        name, low=low, high=high, rest=rest, sequence=sequence, following=following, **values
+        name,
+        low=low,
+        high=high,
+        rest=rest,
+        sequence=sequence,
+        following=following,
+        backlash=backlash,
+        take_up=take_up,
+        hysteresis=hysteresis,
+        sensor=sensor,
+        **values,
     )
 
 

@@ -4,15 +4,20 @@ programmed path. Lengths in mm, in X, Y, Z.
 """
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy
 from numpy.typing import NDArray
 
-REST, STILL_MM, NEAR_MM = 40, 1e-6, 0.02  # rows of a path at rest, moved less, near a place
+REST, STILL_MM = 40, 1e-6  # rows of a path at rest, moved less
+NEAR_MM, CLOSE_MM = 0.02, 0.005  # at a place: not gone yet, and come there
 
-DWELL, FIRST_LINE = "G4 P0.1", 5
+# The last bit to the start is slow, so that the machine has settled when the program begins. A
+# dwell would be one of the computer's time, which is not that of a simulated machine.
+BEFORE_MM, SETTLING_FEED = 0.05, 20  # 0.15 s
+FIRST_LINE = 6
 
 Points = NDArray[numpy.float64]  # n rows of X, Y, Z
 Point = tuple[float, float, float]
@@ -116,19 +121,20 @@ class Program:
         self.moves.append(Arc(self.place, (x, y), turn, rise))
         return self
 
-    def text(self) -> str:
-        """The G-code; the first move is in line FIRST_LINE."""
+    def text(self, letters: str = "XYZ") -> str:
+        """The G-code for a machine of these axes; the first move is in line FIRST_LINE."""
         x, y, z = self.start
         lines = [
             "G21 G90 G17 G91.1 G40 G49",
-            f"{self.mode} F{self.feed:g}",
-            f"G0 X{x:.6f} Y{y:.6f} Z{z:.6f}",
-            DWELL,
+            self.mode,
+            f"G0 X{x - BEFORE_MM:.6f} Y{y:.6f} Z{z:.6f}",
+            f"G1 X{x:.6f} F{SETTLING_FEED}",
+            f"F{self.feed:g}",
             *(move.code() for move in self.moves),
-            DWELL,
             "M2",
         ]
-        return "\n".join(lines) + "\n"
+        text = "\n".join(lines) + "\n"
+        return text if "Z" in letters else re.sub(" Z[-.0-9]+", "", text)
 
     def errors(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
         """Distances in mm of a path from the program while it was followed, and the path after
@@ -136,7 +142,7 @@ class Program:
         moves by less than still_mm; ValueError if it does not do so in this order.
         """
         resting = numpy.linalg.norm(path[REST:] - path[:-REST], axis=1) < still_mm
-        near = first(at(path, self.start), 0, "the start")
+        near = first(at(path, self.start, CLOSE_MM), 0, "the start")
         moved = first(~at(path, self.start), near, "a motion")
         ended = first(resting & at(path, self.place), moved, "the end")
         began = near + int(numpy.argmin(numpy.linalg.norm(path[near:moved] - self.start, axis=1)))
@@ -145,9 +151,9 @@ class Program:
         return distances, path[ended:]
 
 
-def at(path: Points, place: Point) -> NDArray[numpy.bool_]:
+def at(path: Points, place: Point, within_mm: float = NEAR_MM) -> NDArray[numpy.bool_]:
     """Where a path is at a place, without its last rows."""
-    near: NDArray[numpy.bool_] = numpy.linalg.norm(path[:-REST] - place, axis=1) < NEAR_MM
+    near: NDArray[numpy.bool_] = numpy.linalg.norm(path[:-REST] - place, axis=1) < within_mm
     return near
 
 
@@ -200,6 +206,7 @@ def moments(path: Sequence[Sequence[float]], periods_per_mm: float) -> Points:
     return found
 
 
+STAGE_PROGRAMS = {"circle": circle((1.5, 1.5), 0.5, 0, 60)}  # of S0
 PROGRAMS = {
     "circle": circle((15, 10), 5, 1, 600),
     "pocket": pocket((10, 10), 3, 1, 1, 900),

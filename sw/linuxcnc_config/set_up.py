@@ -7,10 +7,12 @@ carries, the session, the watchdog. The made HAL file runs it before it loads th
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Self
 
 from linuxcnc_config.lists import READS, WRITES
 from moire.bus.transport import open_bus
+from moire.client.axis import Axis
 from moire.client.bus import Bus
 from moire.client.link import ProcessData
 from moire.client.node import Node
@@ -24,6 +26,21 @@ class Unfit(Exception):
     """One sentence that says why the node cannot be used."""
 
 
+class Backlash(NamedTuple):
+    """What Axis.set_backlash takes."""
+
+    length: str
+    velocity: str
+    hysteresis: str
+    motor_side: bool
+
+    @classmethod
+    def parsed(cls, text: str) -> tuple[int, Self]:
+        """(number of the axis, its backlash) of `0:5um:2mm/s:0.5um:table`, or `motor`."""
+        number, length, velocity, hysteresis, side = text.split(":")
+        return int(number), cls(length, velocity, hysteresis, {"motor": True, "table": False}[side])
+
+
 def set_up(
     node: Node,
     axes: int,
@@ -31,9 +48,11 @@ def set_up(
     bit_time: int | None = None,
     watchdog_s: float = WATCHDOG_S,
     force: bool = False,
+    backlash: Mapping[int, Backlash] = {},
 ) -> None:
     """Sets the link of a node up and switches it on; Unfit if it has none, has another number of
-    axes, or serves another host, unless it is to be taken from that by `force`.
+    axes, or serves another host, unless it is to be taken from that by `force`. `backlash` is that
+    of axes by their numbers.
     """
     state = node.read_named("link.state")
     if not state["built"]:
@@ -43,6 +62,8 @@ def set_up(
         raise Unfit(f"the node has {found} axes, the configuration has {axes}")
     if state["on"] and not state["expired"] and not force:
         raise Unfit(f"another host runs the node, in session {state['session']}")
+    for number, one in backlash.items():
+        Axis(node, number).set_backlash(*one)
     ProcessData(WRITES, READS).set_up(node, bit_time, watchdog_s, session=session)
 
 
@@ -56,11 +77,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--axes", type=int, required=True, help="axes of the configuration")
     parser.add_argument("--session", type=int, required=True, help=f"1 to {LONGEST_SESSION}")
     parser.add_argument("--force", action="store_true", help="take the node from another host")
+    parser.add_argument(
+        "--backlash",
+        action="append",
+        default=[],
+        metavar="AXIS:LENGTH:VELOCITY:HYSTERESIS:SIDE",
+        help="backlash of an axis, how fast it is taken up, after which motion back, and the side "
+        "on which the sensor is, motor or table: 0:5um:2mm/s:0.5um:table",
+    )
     options = parser.parse_args(arguments)
+    try:
+        backlash = dict(Backlash.parsed(text) for text in options.backlash)
+    except (ValueError, KeyError):
+        parser.error("--backlash needs five parts, as 0:5um:2mm/s:0.5um:table")
     try:
         with open_bus(options.port) as port:
             node = Bus(port).node(options.address)
-            set_up(node, options.axes, options.session, force=options.force)
+            set_up(node, options.axes, options.session, force=options.force, backlash=backlash)
     except (MoireError, Unfit) as why:
         print(f"moire: {options.port}: {why}", file=sys.stderr)
         return 1

@@ -19,23 +19,16 @@ import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import date
 from functools import cache
 from pathlib import Path
 
-from mutation import equivalence
+from mutation import equivalence, record
 from mutation.block import BUILD, CellMutant, Fault, MutationError, Run, mutants_of
 from twin.build import ROOT, rtl_path
 
 MUTANTS = 1000  # of a block
 LOOK = 30  # of a fault in another build
 REASONS = Path(__file__).with_name("blocks.toml")
-RECORD = ROOT / "docs" / "mutants.toml"
-HEAD = """\
-# SPDX-License-Identifier: Apache-2.0
-# Which mutants of which blocks have been run, and what no test sees. Written by
-# `python -m mutation.blocks --record`; docs/mutation.md says how to read it.
-"""
 LONGEST_S = 24 * 3600
 
 
@@ -289,11 +282,9 @@ def measured(block: str, count: int = MUTANTS, seed: int = 1, only: str = "") ->
         return judge(block, runs, looks)
 
 
-def record(block: str, verdicts: Verdicts, count: int, seed: int) -> None:
-    """Add the verdicts of a block to the record, in place of older ones."""
-    known = tomllib.loads(RECORD.read_text()) if RECORD.exists() else {}
-    known[block] = {
-        "date": date.today(),
+def entry_of(verdicts: Verdicts, count: int, seed: int) -> record.Entry:
+    """What docs/mutants.toml says of a block."""
+    return {
         "mutants": verdicts.different + verdicts.equivalent,
         "seed": seed,
         "asked": count,
@@ -302,17 +293,6 @@ def record(block: str, verdicts: Verdicts, count: int, seed: int) -> None:
         "survivors": [survivor.text for survivor in verdicts.survivors],
         "explained": [f"{s.text}: {reason.why}" for s, reason in verdicts.explained],
     }
-    lines = [HEAD]
-    for name, entry in sorted(known.items()):
-        lines.append(f"[{name}]")
-        for key, value in entry.items():
-            if isinstance(value, list):
-                inside = "".join(f"    {json.dumps(text, ensure_ascii=False)},\n" for text in value)
-                lines.append(f"{key} = [\n{inside}]" if value else f"{key} = []")
-            else:
-                lines.append(f"{key} = {value}")
-        lines.append("")
-    RECORD.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -344,7 +324,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"  stale reason: {line}", flush=True)
         wrong += len(verdicts.survivors) + len(verdicts.stale)
         if options.record:
-            record(name, verdicts, options.count, options.seed)
+            record.add(name, entry_of(verdicts, options.count, options.seed))
     return int(wrong > 0)
 
 

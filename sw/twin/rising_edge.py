@@ -120,16 +120,25 @@ def changed(lines: Sequence[str], words: Mapping[str, int]) -> Names:
     return effect_of(Parser(statements, words).block()).changes
 
 
-def body(code: str, name: str) -> list[str]:
-    """The lines of a function of the class, with those of the functions that it calls."""
+def body(code: str, name: str, types: dict[str, str] | None = None) -> list[str]:
+    """The lines of a function of the class, with those of the functions that it calls. A variable
+    whose name has another type in one of them, as in `types`, gets a name of its own.
+    """
+    types = {} if types is None else types
     pattern = rf"^(?:VL_ATTR_COLD )?void {ROOT}___{name}\({ROOT}\* vlSelf\) {{\n(.*?)^}}\n(?=\n|\Z)"
     match = re.search(pattern, code, re.M | re.S)
     if not match:
         raise FormError(f"there is no function {name}")
-    found = []
-    for line in match[1].splitlines():
+    found, text = [], match[1]
+    declared = [m for line in text.splitlines() if (m := DECLARATION.fullmatch(line))]
+    own = {match[2]: match[1] for match in declared}
+    for variable in own:
+        if types.get(variable, own[variable]) != own[variable]:
+            text = re.sub(rf"\b{variable}\b", f"{variable}_of_{name}", text)
+    types |= own
+    for line in text.splitlines():
         if call := CALL.fullmatch(line):
-            found += body(code, call[1])
+            found += body(code, call[1], types)
         elif line and not line.startswith(PROLOGUE):
             found.append(line)
     return found

@@ -14,11 +14,13 @@ class CommandExcitation:
     def first(self):
         return int(self.at == 0)
 
-    def adds(self, axis, period, valid, result_axis, kind):
-        return valid and period != 0 and kind == COMMAND and result_axis == axis
+    def adds(self, axis, period, running, valid, result_axis, kind):
+        return valid and period != 0 and running and kind == COMMAND and result_axis == axis
 
-    def excited(self, axis=0, period=0, limit=0, valid=0, result_axis=0, kind=0, result=0):
-        if not self.adds(axis, period, valid, result_axis, kind):
+    def excited(
+        self, axis=0, period=0, running=1, limit=0, valid=0, result_axis=0, kind=0, result=0
+    ):
+        if not self.adds(axis, period, running, valid, result_axis, kind):
             return result
         low = (result + (1 << 15)) % (1 << 16) - (1 << 15)
         return max(-limit, min(limit, low + self.value))
@@ -27,6 +29,7 @@ class CommandExcitation:
         self,
         axis=0,
         period=0,
+        running=1,
         valid=0,
         result_axis=0,
         kind=0,
@@ -39,7 +42,7 @@ class CommandExcitation:
         self.value = self.waveform[self.at % self.depth]
         if store:
             self.waveform[store_at % self.depth] = store_value
-        if rst or period == 0:
+        if rst or period == 0 or not running:
             self.at = 0
-        elif self.adds(axis, period, valid, result_axis, kind):
+        elif self.adds(axis, period, running, valid, result_axis, kind):
             self.at = self.at + 1 if self.at + 1 < period else 0

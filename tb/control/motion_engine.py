@@ -134,6 +134,7 @@ class Axis:
     def __init__(self, filters=0):
         self.settings = dict(SETTINGS)
         self.shift_by = 0  # of the last shift
+        self.take_up = 0  # of the backlash
         self.filters = [Filter() for _ in range(filters)]
         self.reset()
 
@@ -329,7 +330,7 @@ class Axis:
     def steps(self, block_up, block_down, lost_off):
         s = self.settings
         blocked = block_down if self.command < 0 else block_up
-        required = self.target + (0 if blocked else self.command * s["trim_scale"])
+        required = self.target + (0 if blocked else self.command * s["trim_scale"]) + self.take_up
         restart = int(bool(self.rebased or lost_off))
         self.rebased = 0
         return [("steps", wrap(required * s["step_ratio"] >> 32, 48), restart)]

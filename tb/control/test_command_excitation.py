@@ -15,6 +15,7 @@ from tb.control.command_excitation import COMMAND, CommandExcitation
 IDLE = dict(
     axis=0,
     period=0,
+    running=1,
     limit=32767,
     store=0,
     store_at=0,
@@ -24,7 +25,7 @@ IDLE = dict(
     kind=0,
     result=0,
 )
-PASSED = ("axis", "period", "limit", "valid", "result_axis", "kind", "result")
+PASSED = ("axis", "period", "running", "limit", "valid", "result_axis", "kind", "result")
 
 
 async def begin(dut):
@@ -73,8 +74,9 @@ async def latency_is_0_and_2_to_the_next_value(dut):
 async def it_begins_with_value_0_after_it_was_off(dut):
     model = await begin(dut)
     assert [await command(dut, model) for _ in range(2)] == [100, 200]
-    await command(dut, model, period=0)
-    assert [await command(dut, model) for _ in range(2)] == [100, 200]
+    for off in (dict(period=0), dict(running=0)):
+        assert await command(dut, model, 7, **off) == 7
+        assert [await command(dut, model) for _ in range(2)] == [100, 200]
     await cycle(dut, model, period=3, rst=1)
     await cycle(dut, model, period=3)
     assert await command(dut, model) == 100
@@ -115,8 +117,9 @@ async def other_results_and_other_axes_pass_unchanged(dut):
 
 @cocotb.test()
 async def any_use_matches_the_model_in_every_cycle(dut):
-    model, period, axis, since = await begin(dut), 0, 0, 9
+    model, period, axis, since, running = await begin(dut), 0, 0, 9, 1
     for _ in range(4000):
+        running ^= random.random() < 0.02
         if random.random() < 0.02:
             period, axis = random.randrange(model.depth + 1), random.randrange(8)
             since = 0
@@ -128,6 +131,7 @@ async def any_use_matches_the_model_in_every_cycle(dut):
             model,
             axis=axis,
             period=period,
+            running=running,
             limit=random.choice([0, 300, 32767]),
             valid=valid,
             result_axis=random.choice([axis, random.randrange(8)]),

@@ -35,7 +35,7 @@ STROBES = dict(
 LEVELS = ("block_up", "block_down", "closed_loop")
 IDLE = dict.fromkeys(
     ("tick", "now", "setting_write", "setting_axis", "setting_word", "setting_filter", "setting")
-    + ("position", "stepped", "downward", "shift_by", *LEVELS, *STROBES.values()),
+    + ("position", "stepped", "downward", "shift_by", "take_up", *LEVELS, *STROBES.values()),
     0,
 )
 
@@ -78,6 +78,11 @@ class Engine:
         """The amount of the next shift of axis n."""
         self.models[n].shift_by = by
         self.dut.shift_by.value = by & (1 << 48) - 1
+
+    def take_up(self, n, value):
+        """What takes up the backlash of axis n."""
+        self.models[n].take_up = value
+        self.dut.take_up.value = sum(m.take_up << 24 * n for n, m in enumerate(self.models))
 
     async def drive_levels(self):
         for name in LEVELS:
@@ -624,6 +629,8 @@ async def random_ticks(engine, ticks, realistic):
                 )
             elif random.random() < 0.3:
                 engine.levels[n] = dict(block_up=0, block_down=0, closed_loop=1)
+            if random.random() < 0.2:
+                engine.take_up(n, random.choice((0, (1 << 24) - 1, random.getrandbits(24))))
             for _ in range(random.choice((0, 0, 1, 2))):
                 step = signed(random.choice((16, 16, 20, 34)))
                 await engine.clk(stepped={n: (step, int(step < 0))})
@@ -639,6 +646,21 @@ async def random_ticks(engine, ticks, realistic):
 def ticks_of(engine):
     """As many as the environment says, else fewer for more axes: each takes its own time."""
     return int(os.environ.get("TICKS", min(80, 100 // engine.axes)))
+
+
+@cocotb.test()
+async def what_takes_up_the_backlash_moves_the_steps_alone(dut):
+    engine = await Engine(dut).reset()
+    for n in range(engine.axes):
+        await engine.settings(n, step_ratio=3 << 32)
+        await engine.request(n, "set")
+    await engine.tick()
+    found = []
+    for take_up in (0, 5, (1 << 24) - 1):
+        engine.take_up(engine.axes - 1, take_up)
+        await engine.tick()
+        found.append(engine.models[-1].steps(0, 0, 0)[0][1])
+    assert found == [0, 15, 3 * ((1 << 24) - 1)]
 
 
 @cocotb.test()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of tick_recorder: a recording by hand, all signals, decimation, the wait for a waveform,
-what is left out, and random use against the model in every cycle.
+"""Tests of tick_recorder: recordings by hand, all signals, decimation, each trigger, samples from
+before it, delay, streams, what is left out, and random use against the model in every cycle.
 """
 
 import random
@@ -10,28 +10,29 @@ import pytest
 from cocotb.triggers import FallingEdge
 
 from tb.bench import run, start
-from tb.control.tick_recorder import COMMAND, TickRecorder
-
-IDLE = dict(
-    start=0,
-    axis=0,
-    signals=0,
-    length=1,
-    every=1,
-    tick=0,
-    ready=1,
-    sine_cosine=0,
-    valid=0,
-    result_axis=0,
-    kind=0,
-    result=0,
-    read=0,
+from tb.control.tick_recorder import (
+    ALWAYS,
+    BEYOND,
+    BITS,
+    COMMAND,
+    EMPTY,
+    FALLS,
+    FULL,
+    IDLE,
+    RECORDING,
+    RISES,
+    SIGNALS,
+    WAITING,
+    TickRecorder,
 )
-ERROR = 4
+
+POSITION, FAULTS, ERROR = 6, 9, 4
+KINDS = (3, 1, 2, ERROR, COMMAND, 6, 0)  # of results, in the order of the engine
+EMPTIED = 9  # cycles in which all signals that are no results are taken
 
 
 async def begin(dut):
-    await start(dut, **IDLE)
+    await start(dut, **{name: value for name, value in IDLE.items() if name != "rst"})
     await FallingEdge(dut.clk)
     model = TickRecorder(int(dut.WORDS.value))
     await cycle(dut, model, rst=1)
@@ -39,44 +40,78 @@ async def begin(dut):
 
 
 async def cycle(dut, model, **inputs):
-    """Advance one cycle; returns (word or None, recording, full)."""
-    for name, value in (IDLE | dict(rst=0) | inputs).items():
+    """Advance one cycle; returns (word or None, phase, available, triggered)."""
+    for name, value in (IDLE | inputs).items():
         getattr(dut, name).value = value
     await FallingEdge(dut.clk)
     want = model.step(**inputs)
     word = None if want[0] is None else dut.word.value.to_unsigned()
-    got = word, int(dut.recording.value), int(dut.full.value)
-    assert got == want, f"(word, recording, full) is {got}, the model has {want}"
+    got = (
+        word,
+        dut.phase.value.to_unsigned(),
+        dut.available.value.to_unsigned(),
+        int(dut.triggered.value),
+    )
+    assert got == want, f"(word, phase, available, triggered) is {got}, the model has {want}"
     return got
 
 
-async def served(dut, model, number, axis=0, ready=1, **settings):
-    """A tick and the results of two axes, in the order of the engine; values name tick and kind."""
-    await cycle(dut, model, axis=axis, tick=1, ready=ready, sine_cosine=8 * number, **settings)
+def word_of(number, signal):
+    """What served() gives a signal in this sample."""
+    return 16 * number + signal
+
+
+async def served(dut, model, number, ready=1, values=None, **settings):
+    """A tick and the results of two axes, in the order of the engine. `values` replaces those of
+    some signals; returns phase, available, triggered."""
+    axis = settings.get("axis", 0)
+    given = {n: word_of(number, n) for n in range(SIGNALS)} | (values or {})
+    before = word_of(number - 1, 1) & 0xFFFF_FFFF
+    held = dict(
+        settings,
+        ready=ready,
+        sine_cosine=given[0],
+        target=before,
+        position=given[POSITION],
+        interpolated=given[7],
+        fine_command=given[8],
+        faults=given[FAULTS],
+    )
+    await cycle(dut, model, tick=1, **held)
+    for _ in range(EMPTIED):
+        await cycle(dut, model, **held)
     for result_axis in range(2):
-        for kind in (3, 1, 2, ERROR, COMMAND, 6, 0):
-            await cycle(
-                dut,
-                model,
-                axis=axis,
-                valid=1,
-                result_axis=result_axis,
-                kind=kind,
-                result=8 * number + kind + (1 << 20) * (result_axis != axis),
-                ready=ready,
-                **settings,
+        for kind in KINDS:
+            ours = result_axis == axis
+            result = given[kind] if ours else 0x7FFF_FFFF
+            last = await cycle(
+                dut, model, valid=1, result_axis=result_axis, kind=kind, result=result, **held
             )
+    return last[1:]
 
 
-async def words(dut, model, count):
+async def words(dut, model, count, **settings):
     """The recording as the firmware reads it."""
-    assert dut.full.value == 1
     out = []
     for _ in range(count):
-        await cycle(dut, model)
-        out.append((await cycle(dut, model))[0])
-        await cycle(dut, model, read=1)
+        await cycle(dut, model, **settings)
+        out.append((await cycle(dut, model, **settings))[0])
+        await cycle(dut, model, read=1, **settings)
     return out
+
+
+async def recorded(dut, model, errors, **settings):
+    """Records these errors until it is full; returns how many were served and what was kept."""
+    settings = dict(signals=1 << ERROR, trigger_signal=ERROR) | settings
+    await cycle(dut, model, start=1, **settings)
+    for number, error in enumerate(errors):
+        phase, count, _ = await served(
+            dut, model, number, values={ERROR: error & 0xFFFF_FFFF}, **settings
+        )
+        if phase == FULL:
+            kept = await words(dut, model, count, **settings)
+            return number + 1, [(word + (1 << 31)) % (1 << 32) - (1 << 31) for word in kept]
+    return None
 
 
 @cocotb.test()
@@ -86,11 +121,11 @@ async def latency_is_1_to_full_and_2_to_the_first_and_each_next_word(dut):
     await cycle(dut, model, start=1, **settings)
     await served(dut, model, 0, **settings)
     await cycle(dut, model, tick=1, **settings)
-    assert not int(dut.full.value)
+    assert dut.phase.value.to_unsigned() == RECORDING
     await cycle(dut, model, valid=1, kind=COMMAND, result=99, **settings)
-    assert int(dut.full.value)
+    assert dut.phase.value.to_unsigned() == FULL and dut.available.value.to_unsigned() == 2
     await cycle(dut, model)
-    assert (await cycle(dut, model))[0] == COMMAND
+    assert (await cycle(dut, model))[0] == word_of(0, COMMAND)
     await cycle(dut, model, read=1)
     assert (await cycle(dut, model))[0] == 99
 
@@ -98,18 +133,51 @@ async def latency_is_1_to_full_and_2_to_the_first_and_each_next_word(dut):
 @cocotb.test()
 async def each_sample_has_the_chosen_signals_of_its_tick_in_order(dut):
     model = await begin(dut)
-    for signals in (0b111111, 0b110000, 0b000001, 0b001000, 0b100010):
-        kinds = [n for n in range(6) if signals >> n & 1]
+    for signals in (0b1111111111, 0b110000, 0b1000000001, 0b1000, 0b110100010, 0b1001000000):
+        numbers = [n for n in range(SIGNALS) if signals >> n & 1]
         for axis in range(2):
-            length = model.words // len(kinds)
-            settings = dict(signals=signals, length=length)
-            await cycle(dut, model, start=1, axis=axis, **settings)
+            length = model.words // len(numbers)
+            settings = dict(signals=signals, length=length, axis=axis)
+            await cycle(dut, model, start=1, **settings)
             for number in range(length):
-                assert not int(dut.full.value)
-                await served(dut, model, number, axis, **settings)
-            assert await words(dut, model, length * len(kinds)) == [
-                8 * number + kind for number in range(length) for kind in kinds
+                assert dut.phase.value.to_unsigned() != FULL
+                await served(dut, model, number, **settings)
+            count = dut.available.value.to_unsigned()
+            assert await words(dut, model, count) == [
+                word_of(number, n) for number in range(length) for n in numbers
             ]
+            assert dut.available.value.to_unsigned() == 0
+
+
+@cocotb.test()
+async def a_signal_waits_for_the_results_that_come_with_it(dut):
+    model = await begin(dut)
+    settings = dict(signals=0b1111111111, length=1, faults=9, position=6, target=99)
+    await cycle(dut, model, start=1, **settings)
+    await cycle(dut, model, tick=1, **settings)
+    for kind in (1, 2, 3, 4):
+        await cycle(dut, model, valid=1, kind=kind, result=kind, **settings)
+    for _ in range(EMPTIED):
+        await cycle(dut, model, **settings)
+    await cycle(dut, model, valid=1, kind=COMMAND, result=5, **settings)
+    assert await words(dut, model, 10) == [0, 1, 2, 3, 4, 5, 6, 0, 0, 9]
+
+
+@cocotb.test()
+async def a_target_at_rest_gives_no_results_and_is_recorded_with_no_velocity(dut):
+    model = await begin(dut)
+    settings = dict(signals=0b110, length=3, target=99)
+    settings |= dict(trigger_signal=2, trigger_mode=RISES, level=1, earlier=1)
+    await cycle(dut, model, start=1, **settings)
+    for velocity in (None, 7, 7, None, 7):
+        await cycle(dut, model, tick=1, **settings)
+        for _ in range(EMPTIED):
+            await cycle(dut, model, **settings)
+        for kind, result in ((1, 50), (2, velocity)):
+            if velocity:
+                await cycle(dut, model, valid=1, kind=kind, result=result, **settings)
+        await cycle(dut, model, valid=1, kind=COMMAND, **settings)
+    assert await words(dut, model, 6) == [99, 0, 50, 7, 50, 7]
 
 
 @cocotb.test()
@@ -119,24 +187,93 @@ async def one_tick_in_so_many_is_kept_and_0_acts_as_1(dut):
         settings = dict(signals=1 << ERROR, length=3, every=every)
         await cycle(dut, model, start=1, **settings)
         number = 0
-        while not int(dut.full.value):
+        while dut.phase.value.to_unsigned() != FULL:
             await served(dut, model, number, **settings)
             number += 1
         step = max(every, 1)
-        assert await words(dut, model, 3) == [8 * step * n + ERROR for n in range(3)]
+        assert await words(dut, model, 3) == [word_of(step * n, ERROR) for n in range(3)]
 
 
 @cocotb.test()
-async def the_first_sample_waits_until_it_is_ready(dut):
+async def each_trigger_finds_its_sample_and_keeps_those_before_it(dut):
     model = await begin(dut)
-    settings = dict(signals=1 << ERROR, length=2)
+    errors = [9, 1, -3, 4, 6, 8, 3, -7, -9, 2, 0, 0, 0]
+    for settings, first in (
+        (dict(trigger_mode=ALWAYS), 0),
+        (dict(trigger_mode=RISES, level=5), 4),
+        (dict(trigger_mode=RISES, level=0), 3),
+        (dict(trigger_mode=FALLS, level=5), 1),
+        (dict(trigger_mode=FALLS, level=-8 & 0xFFFF_FFFF), 8),
+        (dict(trigger_mode=BEYOND, level=9), 0),
+        (dict(trigger_mode=BITS, level=4), 2),
+    ):
+        served_count, kept = await recorded(dut, model, errors, length=3, **settings)
+        assert kept == errors[first : first + 3] and served_count == first + 3
+    for before in (1, 2, 4):
+        settings = dict(trigger_mode=BEYOND, level=7, length=5, earlier=before)
+        _, kept = await recorded(dut, model, errors, **settings)
+        assert kept == errors[5 - before : 10 - before], "9 came before there were samples"
+
+
+@cocotb.test()
+async def the_signal_of_the_trigger_need_not_be_recorded(dut):
+    model = await begin(dut)
+    settings = dict(signals=1 << COMMAND, trigger_mode=BITS, trigger_signal=FAULTS, level=0b110)
+    settings |= dict(length=2, earlier=1)
     await cycle(dut, model, start=1, **settings)
-    for number in range(3):
-        await served(dut, model, number, ready=0, **settings)
-        assert int(dut.recording.value)
-    await served(dut, model, 3, **settings)
-    await served(dut, model, 4, ready=0, **settings)
-    assert await words(dut, model, 2) == [8 * 3 + ERROR, 8 * 4 + ERROR]
+    for number, faults in enumerate((0b110, 0, 1, 0b1000, 0b100, 0, 0)):
+        await served(dut, model, number, values={FAULTS: faults}, **settings)
+        want = FULL if number >= 4 else WAITING
+        assert dut.phase.value.to_unsigned() == want
+    assert await words(dut, model, 2) == [word_of(n, COMMAND) for n in (3, 4)]
+
+
+@cocotb.test()
+async def after_a_delay_the_first_sample_waits_until_it_is_ready(dut):
+    model = await begin(dut)
+    for delay, first in ((1, 3), (2, 4), (5, 7)):
+        settings = dict(signals=1 << ERROR, length=2, delay=delay)
+        settings |= dict(trigger_signal=ERROR, trigger_mode=RISES, level=word_of(2, ERROR))
+        await cycle(dut, model, start=1, **settings)
+        for number in range(11):
+            phase, _, triggered = await served(
+                dut, model, number, ready=int(number != first), **settings
+            )
+            assert triggered == (2 <= number < first + 2), "until the recording is full"
+            assert phase == (
+                WAITING if number <= first else FULL if number >= first + 2 else RECORDING
+            )
+        assert await words(dut, model, 2) == [word_of(first + n, ERROR) for n in (1, 2)]
+
+
+@cocotb.test()
+async def a_recording_that_is_too_long_ends_when_the_memory_is_full(dut):
+    model = await begin(dut)
+    settings = dict(signals=0b111, length=1000)
+    await cycle(dut, model, start=1, **settings)
+    number = 0
+    while dut.phase.value.to_unsigned() != FULL:
+        await served(dut, model, number, **settings)
+        number += 1
+    assert number == model.words // 3 and dut.available.value.to_unsigned() == 3 * number
+
+
+@cocotb.test()
+async def a_stream_is_read_while_it_records_until_nobody_reads(dut):
+    model = await begin(dut)
+    settings = dict(signals=1 << ERROR | 1 << POSITION, length=0)
+    await cycle(dut, model, start=1, **settings)
+    got, number = [], 0
+    for number in range(3 * model.words):
+        await served(dut, model, number, **settings)
+        assert dut.phase.value.to_unsigned() == RECORDING
+        got += await words(dut, model, dut.available.value.to_unsigned(), **settings)
+    assert got == [word_of(n, s) for n in range(number + 1) for s in (ERROR, POSITION)]
+    while dut.phase.value.to_unsigned() != FULL:
+        number += 1
+        await served(dut, model, number, **settings)
+    rest = await words(dut, model, dut.available.value.to_unsigned(), **settings)
+    assert len(rest) == model.words // 2 * 2 and rest[-1] == word_of(number, POSITION)
 
 
 @cocotb.test()
@@ -147,7 +284,7 @@ async def results_between_two_ticks_change_nothing(dut):
     for number in range(2):
         await served(dut, model, number, **settings)
         await cycle(dut, model, valid=1, kind=1, result=77, **settings)
-    assert await words(dut, model, 4) == [1, ERROR, 9, 8 + ERROR]
+    assert await words(dut, model, 4) == [1, ERROR, 17, 16 + ERROR]
 
 
 @cocotb.test()
@@ -160,31 +297,43 @@ async def start_or_reset_in_the_middle_forgets_the_recording(dut):
         await cycle(dut, model, **{how: 1}, **settings)
         for number in range(2):
             await served(dut, model, number, **settings)
-        assert int(dut.full.value) == (how == "start")
+        assert dut.phase.value.to_unsigned() == (FULL if how == "start" else EMPTY)
 
 
 @cocotb.test()
 async def any_use_matches_the_model_in_every_cycle(dut):
     model = await begin(dut)
-    for _ in range(60):
-        signals = random.randrange(1, 64)
+    for _ in range(80):
+        signals = random.randrange(1, 1 << SIGNALS)
+        most = model.words // signals.bit_count()
+        length = random.choice((0, most, random.randrange(1, most + 2)))
         settings = dict(
             axis=random.randrange(8),
             signals=signals,
-            length=random.randrange(1, model.words // signals.bit_count() + 1),
+            trigger_signal=random.randrange(SIGNALS),
+            trigger_mode=random.randrange(8),
+            level=random.choice((0, 5, random.getrandbits(32))),
+            length=length,
             every=random.choice((0, 1, 1, 2, 3)),
+            earlier=random.choice((0, 0, random.randrange(max(length, 2)))),
+            delay=random.choice((0, 0, 1, 3)),
         )
         await cycle(dut, model, start=1, **settings)
-        for _ in range(random.choice((10, 200))):
+        for _ in range(random.choice((10, 300))):
             await cycle(
                 dut,
                 model,
                 tick=int(random.random() < 0.1),
                 ready=random.getrandbits(1),
                 sine_cosine=random.getrandbits(32),
+                target=random.getrandbits(32),
+                position=random.getrandbits(32),
+                interpolated=random.getrandbits(16),
+                fine_command=random.getrandbits(32),
+                faults=random.getrandbits(4),
                 valid=random.getrandbits(1),
                 result_axis=random.choice([settings["axis"], random.randrange(8)]),
-                kind=random.randrange(8),
+                kind=random.choice([COMMAND, random.randrange(8)]),
                 result=random.getrandbits(32),
                 read=random.getrandbits(1),
                 rst=int(random.random() < 0.002),
@@ -192,6 +341,6 @@ async def any_use_matches_the_model_in_every_cycle(dut):
             )
 
 
-@pytest.mark.parametrize("words", [8, 64])
+@pytest.mark.parametrize("words", [16, 32])
 def test_tick_recorder(words):
     run("tick_recorder", __file__, WORDS=words)

@@ -432,7 +432,7 @@ def test_sigrok_counts_the_same_steps():
     """The stepper_motor decoder of sigrok, made by others, reports the position at each step."""
     program = shutil.which("sigrok-cli")
     if not program:
-        pytest.skip("no sigrok-cli")
+        pytest.skip("no sigrok-cli: make sigrok")
     run("step_generator", __file__, TIME_W=TIME_W, RATE_F=RATE_F, AHEAD_W=AHEAD_W)
     result = subprocess.run(
         [

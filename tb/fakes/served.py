@@ -16,12 +16,11 @@ from tb.fakes.rs485_bus import Rs485Bus
 HANG_S = 60  # of the clock: what has not come by then never will
 
 
-class ServedBus:
+class ServedTransport:
     """A gateway in a thread, which begins with `begin`, when its doors are open."""
 
-    def __init__(self, *nodes):
-        self.far = Rs485Bus(*nodes)
-        self.gateway = Gateway(self.far)
+    def __init__(self, far):
+        self.far, self.gateway = far, Gateway(far)
         self.ending, self.looked = False, threading.Condition()
         self.thread = threading.Thread(target=self.run)
 
@@ -42,6 +41,13 @@ class ServedBus:
     def end(self):
         self.ending = True
         self.thread.join()
+
+
+class ServedBus(ServedTransport):
+    """The same with nodes of compiled firmware."""
+
+    def __init__(self, *nodes):
+        super().__init__(Rs485Bus(*nodes))
 
 
 class Served(ServedBus):

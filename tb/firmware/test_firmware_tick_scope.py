@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tick_scope.c: signals at each servo tick, read in order; a waveform that ends with any request to
-its axis, and what is refused.
+"""tick_scope.c: signals at each servo tick, read in order, from a trigger on or without end; a
+waveform that ends with any request to its axis but a motion, and what is refused.
 """
 
 import pytest
 
-from twin.compiled.node import FAULT, PERIOD, TABLE, Axis, CompiledNode
+from twin.compiled.node import DEFINES, FAULT, PERIOD, TABLE, Axis, CompiledNode
 
-SIGNAL = {name: 1 << bit for name, (bit, _) in TABLE["tick_signal"].items()}
+NUMBER = {name: bit for name, (bit, _) in TABLE["tick_signal"].items()}
+SIGNAL = {name: 1 << bit for name, bit in NUMBER.items()}
+TRIGGER = {name: code << 4 for name, (code, _) in TABLE["tick_trigger"].items()}
 STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}
 WORDS, AT_ONCE, VALUES = 1024, 14, 24
 LIMIT = 12345
@@ -24,9 +26,10 @@ def machine():
     return made
 
 
-def record(machine, signals=SIGNAL["error"], every=1, samples=100, axis=0):
+def record(machine, signals=SIGNAL["error"], every=1, samples=100, axis=0, **settings):
+    settings = dict(trigger=0, earlier=0, delay=0, level=0) | settings
     return machine.request(
-        "record_ticks", axis=axis, signals=signals, every=every, samples=samples
+        "record_ticks", axis=axis, signals=signals, every=every, samples=samples, **settings
     )[0]
 
 
@@ -34,14 +37,15 @@ def state(machine):
     return STATE[machine.ask("read_ticks")["state"]]
 
 
-def words(machine, count):
+def words(machine):
     out = []
-    while len(out) < count:
+    while True:
         reply = machine.ask("read_ticks")
-        assert STATE[reply["state"]] == "full" and reply["first"] == len(out)
-        out += [reply[f"word_{n}"] for n in range(AT_ONCE)]
-    assert not any(out[count:]), "nothing follows the last word"
-    return out[:count]
+        assert reply["first"] == len(out)
+        out += [reply[f"word_{n}"] for n in range(reply["count"])]
+        assert not any(reply[f"word_{n}"] for n in range(reply["count"], AT_ONCE))
+        if reply["count"] < AT_ONCE:
+            return out
 
 
 def excite(machine, period=100, axis=0):
@@ -56,26 +60,60 @@ def test_a_record_has_each_signal_of_each_sample_in_order(machine):
     assert state(machine) == "empty"
     machine.ask("move", axis=1, target=3 * PERIOD)
     assert record(machine, SIGNAL["target"] | SIGNAL["error"], 2, 50, axis=1) == "ok"
-    assert state(machine) == "recording" and machine.scope.field("SCOPE_AXIS") == 1
+    assert state(machine) == "waiting" and machine.scope.field("SCOPE_AXIS") == 1
+    machine.run(2)
+    assert state(machine) == "recording" and machine.ask("read_ticks")["count"] == 0
     machine.run(30)
     assert state(machine) == "full"
     # reading the state has passed the first words
     assert machine.ask("read_ticks")["first"] == AT_ONCE
     assert record(machine, SIGNAL["target"] | SIGNAL["error"], 2, 50, axis=1) == "ok"
     machine.run(30)
-    assert words(machine, 100) == machine.scope.recorded
-    assert machine.ask("read_ticks")["first"] == 100
+    got = words(machine)
+    assert len(got) == 100 and got == machine.scope.recorded
 
 
-def test_as_many_samples_as_fit_are_recorded_and_no_more(machine):
-    assert record(machine, 63, samples=WORDS // 6) == "ok"
-    assert record(machine, 63, samples=WORDS // 6 + 1) == "out_of_range"
-    assert record(machine, samples=WORDS) == "ok"
-    assert record(machine, samples=WORDS + 1) == "out_of_range"
-    assert record(machine, samples=0) == "out_of_range"
-    assert record(machine, signals=0) == "out_of_range"
-    assert record(machine, signals=64) == "out_of_range"
+def test_every_setting_of_a_recording_reaches_its_register(machine):
+    settings = dict(trigger=NUMBER["faults"] | TRIGGER["bits"], earlier=3, delay=7, level=-5)
+    assert record(machine, 0x3A5, 9, 77, axis=1, **settings) == "ok"
+    fields = dict(
+        SCOPE_AXIS=1,
+        SCOPE_SIGNALS=0x3A5,
+        SCOPE_TRIGGER=NUMBER["faults"],
+        SCOPE_MODE=TABLE["tick_trigger"]["bits"][0],
+        SCOPE_SAMPLES_LENGTH=77,
+        SCOPE_SAMPLES_EVERY=9,
+        SCOPE_PLACE_EARLIER=3,
+        SCOPE_PLACE_DELAY=7,
+    )
+    assert {name: machine.scope.field(name) for name in fields} == fields
+    assert machine.scope.word[DEFINES["NODE_SCOPE_LEVEL"]] == 0xFFFF_FFFB
     assert record(machine, axis=2) == "no_such_axis"
+
+
+def test_a_recording_waits_for_its_trigger_and_keeps_what_came_before(machine):
+    settings = dict(trigger=NUMBER["faults"] | TRIGGER["bits"], level=FAULT["drive"], earlier=10)
+    assert record(machine, SIGNAL["faults"], samples=20, **settings) == "ok"
+    machine.run(20)
+    assert state(machine) == "waiting"
+    machine.axes[0].causes |= FAULT["drive"]
+    machine.run(10)
+    assert state(machine) == "full"
+    assert machine.scope.recorded == [0] * 10 + [FAULT["drive"]] * 10
+
+
+def test_a_recording_without_an_end_is_read_while_it_goes_on(machine):
+    assert record(machine, samples=0) == "ok"
+    got = 0
+    for _ in range(20):
+        machine.run(2)
+        reply = machine.ask("read_ticks")
+        assert STATE[reply["state"]] == "recording" and reply["first"] == got
+        got += reply["count"]
+    assert 150 <= got <= 160, "four in each millisecond"
+    machine.run(WORDS // 4 + 1)
+    reply = machine.ask("read_ticks")
+    assert STATE[reply["state"]] == "full" and reply["count"] == AT_ONCE
 
 
 def test_a_waveform_is_loaded_up_to_its_longest(machine):
@@ -100,14 +138,24 @@ def test_an_excitation_has_the_limit_of_its_axis_and_ends_on_request(machine):
     "name, fields",
     [
         ("stop", dict(axis=0)),
-        ("move", dict(axis=0, target=PERIOD)),
         ("home", dict(axis=0)),
         ("enable", dict(axis=0, on=0)),
     ],
 )
-def test_any_request_to_the_axis_ends_its_excitation(machine, name, fields):
+def test_any_request_to_the_axis_but_a_motion_ends_its_excitation(machine, name, fields):
     assert excite(machine) == "ok"
     machine.ask(name, **fields)
+    machine.run(2)
+    assert period(machine) == 0
+
+
+@pytest.mark.parametrize("name, fields", [("stop", {}), ("enable", dict(on=0))])
+def test_a_motion_keeps_the_excitation_and_what_ends_it_does_not(machine, name, fields):
+    assert excite(machine) == "ok"
+    machine.ask("move", axis=0, target=100 * PERIOD)
+    machine.run(5)
+    assert period(machine) == 100
+    machine.ask(name, axis=0, **fields)
     machine.run(2)
     assert period(machine) == 0
 

@@ -4,12 +4,14 @@ that recovers from any noise.
 """
 
 import random
+import zlib
 from pathlib import Path
 
 import pytest
 
 from moire.bus import cobs
-from moire.bus.protocol import FROM_NODE, TO_NODE, frame
+from moire.bus.protocol import CRC_LENGTH, FROM_NODE, TO_NODE, frame
+from moire.made.bus_tables import LONGEST_BODY
 from tb.bench import seed
 
 SEED = seed()
@@ -65,6 +67,51 @@ def test_only_a_correct_packet_has_a_body_and_a_node():
     assert all(cobs.body_of(content[:length]) is None for length in range(len(content)))
 
 
+def test_the_shortest_and_the_longest_body_are_read_and_no_empty_or_longer_one():
+    for length, good in ((0, False), (1, True), (LONGEST_BODY, True), (LONGEST_BODY + 1, False)):
+        body = bytes(length)
+        content = bytes([0x21, length]) + body
+        content += zlib.crc32(content).to_bytes(CRC_LENGTH, "little")
+        assert cobs.body_of(content) == (body if good else None), length
+    longest = bytes([0x21]) + frame(0x21, bytes(LONGEST_BODY))
+    assert len(longest) == cobs.LONGEST_PACKET
+    assert len(cobs.sealed(longest)) - 2 <= cobs.LONGEST_STUFFED == cobs.LONGEST_PACKET + 1
+
+
+def speed_body(speed, asked=bytes([9, 0])):
+    """The body of the answer of a server whose machine runs at this speed."""
+    [request] = cobs.PacketReader().feed(cobs.speed_request(asked[0]))
+    assert request == b"\x20" + frame(0x20, asked)
+    [reply] = cobs.PacketReader().feed(cobs.speed_reply(request, speed))
+    assert reply[0] == 0x50
+    return cobs.body_of(reply), reply
+
+
+@pytest.mark.parametrize(
+    "speed, counts, back",
+    [(0.25, 250, 0.25), (None, 0, None), (1.0004, 1000, 1.0), (1e9, 2**32 - 1, 4294967.295)],
+)
+def test_a_server_tells_the_speed_of_its_machine_in_thousandths(speed, counts, back):
+    body, reply = speed_body(speed)
+    assert body == b"\x09\0\0" + counts.to_bytes(4, "little")
+    assert cobs.speed_in(reply) == back
+
+
+def test_what_is_no_request_to_a_server_gets_no_answer_and_what_is_no_answer_has_no_speed():
+    def content(first, body):
+        return bytes([first]) + frame(first, body)
+
+    request = content(0x20, b"\x09\0")
+    assert cobs.speed_reply(request, 1.0)
+    others = [content(0x21, b"\x09\0"), content(0x10, b"\x09\0"), content(0x20, b"\x09\1")]
+    for wrong in (*others, content(0x20, b"\x09"), content(0x20, b"\x09\0\0"), request[:-1]):
+        assert cobs.speed_reply(wrong, 1.0) is None
+    _, reply = speed_body(1.0)
+    assert cobs.speed_in(reply[:-1]) is None
+    for length in (1, 2, 3, 4, 6, 8, 10, 11):
+        assert cobs.speed_in(content(0x50, bytes([1]) * length)) is None
+
+
 def test_a_reader_takes_bytes_one_by_one_or_in_one_piece():
     stream = cobs.packet(0x21, BODY) + cobs.packet(0x22, b"\0" * 64)
     reader = cobs.PacketReader()
@@ -89,5 +136,6 @@ def test_a_packet_that_is_too_long_is_dropped_and_counted_and_not_stored():
     reader = cobs.PacketReader()
     assert reader.feed(b"\x01" * 100_000) == [] and len(reader.held) <= cobs.LONGEST_STUFFED
     assert reader.feed(b"\0") == [] and reader.dropped == 1
+    assert reader.feed(b"\x05\x01\0") == [] and reader.dropped == 2
     longest = bytes([0x21]) + frame(0x21, bytes(range(1, 65)))
     assert reader.feed(cobs.sealed(longest)) == [longest]

@@ -7,6 +7,7 @@ import random
 import pytest
 
 from moire.analysis.ellipse import OFF, Ellipse, Limits, NoEllipse, fit, judged, widest_gap_deg
+from tb.bench import seed
 
 KNOWN = Ellipse(5.0, -7.5, 101.0, 88.0, 6.0, 0.0)
 LIMITS = Limits(32, 160, 126)
@@ -31,6 +32,13 @@ def test_offsets_amplitudes_and_quadrature_error_are_found(share, quadrature_err
     found = fit(*samples(known, evenly(40, share)))
     assert vars(found) == pytest.approx(vars(known), abs=1e-6)
     assert found.amplitude == pytest.approx(94.5)
+
+
+def test_an_ellipse_is_found_whose_extremes_no_sample_meets():
+    source = random.Random(seed())
+    for _ in range(50):
+        turns = [math.radians(37 * n + source.uniform(-5, 5)) for n in range(12)]
+        assert vars(fit(*samples(KNOWN, turns))) == pytest.approx(vars(KNOWN), abs=1e-6)
 
 
 def test_noise_of_the_adc_is_the_deviation():

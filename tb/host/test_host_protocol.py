@@ -8,6 +8,9 @@ import random
 import pytest
 
 from moire.bus.protocol import (
+    FROM_NODE,
+    ODD_ADDRESSES,
+    TO_NODE,
     Exchange,
     State,
     Timing,
@@ -16,6 +19,7 @@ from moire.bus.protocol import (
     layout,
     parse_reply,
     request_body,
+    sync_words,
 )
 from moire.client.bus import Bus
 from moire.errors import BusError, BusGarbled, NoAnswer, OutOfRange
@@ -62,6 +66,20 @@ def test_command_bytes_match_the_8031_stage():
             command_byte(address, 1)
 
 
+def test_addresses_of_odd_parity_are_those_with_an_even_command_byte():
+    """A sender with a parity bit for the ninth one: odd parity sets it if the ones are even."""
+    assert list(ODD_ADDRESSES) == [
+        address
+        for address in range(1, 16)
+        if all(command_byte(address, way).bit_count() % 2 == 0 for way in (TO_NODE, FROM_NODE))
+    ]
+
+
+@pytest.mark.parametrize("number", [0, 77, 255, 256, 511])
+def test_the_words_of_a_sync_are_a_frame_for_address_0(number):
+    assert sync_words(number) == [0x120, *frame(0x20, bytes([number & 0xFF]))]
+
+
 def test_negative_positions_are_two_complement_little_endian():
     assert request_body("move", 1, axis=0, target=-2) == bytes([1, 5, 0, 0xFE]) + b"\xff" * 7
 
@@ -90,6 +108,27 @@ def test_a_reply_of_the_wrong_length_is_none():
     assert parse_reply(b"\x01\x03\x00\x00") is None
     assert parse_reply(b"\x01\x03\x05\x00") is None
     assert parse_reply(b"\x01\x63\x05").cause == 5
+
+
+def test_a_refusal_has_a_cause_and_nothing_else():
+    refusal = bytes([7, 3, 5])
+    assert parse_reply(refusal) == (7, 3, 5, {})
+    for wrong in (b"", refusal[:2], refusal + b"\0", refusal + b"\0\0"):
+        assert parse_reply(wrong) is None
+
+
+def test_the_usual_times_and_tries():
+    exchange = Exchange(1, ENABLE)
+    assert exchange.tries == 5 and exchange.timing.quiet == 0.02
+    assert exchange.timeout_s == pytest.approx(0.1 + 11 / 115200)
+
+
+def test_a_finished_exchange_expects_nothing_and_takes_nothing():
+    exchange = Exchange(1, ENABLE)
+    exchange.feed([0x61, *reply_words()])
+    assert exchange.finished and exchange.expected == 0
+    exchange.feed([0x51, 0x1FF])
+    assert exchange.events == [] and exchange.result().operation == 3
 
 
 def test_silence_is_no_answer_after_all_tries():
@@ -172,6 +211,15 @@ def test_an_exchange_on_a_bus_that_is_never_silent_is_given_up():
         exchange.feed([0xAA])
     with pytest.raises(BusGarbled):
         exchange.result()
+
+
+def test_a_repetition_begins_after_1000_words_of_noise_each_time():
+    exchange = Exchange(1, ENABLE)
+    for attempt in (1, 2):
+        exchange.feed([0x55, *[0xAA] * 999])
+        assert exchange.state == State.QUIET and exchange.attempts == attempt
+        exchange.feed([0xAA])
+        assert exchange.state == State.AWAIT_READY and exchange.attempts == attempt + 1
 
 
 def test_the_timeout_grows_with_the_number_of_expected_words():

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""moire.analysis.tick_scope: requests to the node, its words as signals in their units, and what is
-is refused; test_firmware_tick_scope has the side of the node.
+"""moire.analysis.tick_scope: requests to the node, its words as signals in their units, triggers,
+streams, and what is refused; test_firmware_tick_scope has the side of the node.
 """
 
 import io
@@ -10,9 +10,10 @@ from PIL import Image
 from pyarrow import parquet
 
 from moire.analysis import tick_scope
-from moire.analysis.tick_scope import NotRecorded, TickScope
+from moire.analysis.tick_scope import NotRecorded, TickScope, Trigger
 from moire.client.bus import Bus
-from moire.errors import OutOfRange, Refused
+from moire.errors import OutOfRange, Refused, UnitError
+from moire.made.bus_tables import FAULTS
 from tb.fakes.bus_node import START, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
@@ -51,7 +52,9 @@ def test_signals_are_read_in_their_units_at_equal_distances():
     node = node_of()
     scope = scope_of(node)
     scope.start(("command", "error", "velocity"), 100, "500us")
-    assert node.written("record_ticks") == [dict(axis=0, signals=0b111000, every=2, samples=100)]
+    sent = dict(axis=0, signals=0b111000, every=2, samples=100)
+    sent |= dict(trigger=4, earlier=0, delay=0, level=0)
+    assert node.written("record_ticks") == [sent]
     record = scope.read()
     columns = record.columns()
     assert list(columns) == ["time_s", "velocity_nm_per_s", "error_nm", "command_of_full_scale"]
@@ -88,6 +91,85 @@ def test_sine_and_cosine_are_one_signal():
     assert list(columns["sine_counts"]) == [5] * 3 and list(columns["cosine_counts"]) == [-2] * 3
 
 
+def test_position_phase_and_faults_have_their_units():
+    scope = scope_of(node_of(Ramp(step=PERIOD // 8)))
+    scope.start(["faults", "phase", "position"], 16)
+    columns = scope.read().columns()
+    assert list(columns) == ["time_s", "position_nm", "phase_periods", "faults_bits"]
+    assert columns["position_nm"][1:] - columns["position_nm"][:-1] == pytest.approx([100] * 15)
+    assert columns["phase_periods"] == pytest.approx(columns["position_nm"] / 800 % 1)
+    assert not columns["faults_bits"].any()
+
+
+def test_a_trigger_has_a_level_in_the_unit_of_its_signal_and_samples_before_it():
+    node = node_of()
+    scope = scope_of(node)
+    scope.start(["error"], 100, "500us", Trigger("falls", "error", "-200nm", earlier=30))
+    record = scope.read()
+    level = -200 * PERIOD / 800
+    assert record.time_s[30] == 0 and record.time_s[0] == pytest.approx(-0.015)
+    assert record.values["error"][30] < level <= record.values["error"][29]
+    for signal, level, counts in (
+        ("position", "8um", 10 * PERIOD),
+        ("velocity", "3.2mm/s", PERIOD),
+        ("command", "-25%", -8192),
+        ("phase", "100", 100),
+        ("faults", None, 0),
+    ):
+        assert Trigger("rises", signal, level).counts(scope.axis.period_nm, 4000) == counts
+    assert Trigger("bits", "faults").counts(scope.axis.period_nm, 4000) == 2 ** len(FAULTS) - 1
+
+
+@pytest.mark.parametrize(
+    "trigger, error, message",
+    [
+        (Trigger("jumps"), OutOfRange, "no trigger 'jumps': there are now, rises"),
+        (Trigger("rises", "noise"), OutOfRange, "no signal 'noise' to trigger"),
+        (Trigger("rises", "error", "5"), UnitError, "no unit"),
+        (Trigger("rises", "error", "5m"), OutOfRange, "too large for 'error'"),
+        (Trigger(earlier=100), OutOfRange, "from 0 to 99"),
+        (Trigger(delay=65536), OutOfRange, "or to 65535"),
+    ],
+)
+def test_a_trigger_that_cannot_be_is_refused(trigger, error, message):
+    node = node_of()
+    with pytest.raises(error, match=message):
+        scope_of(node).start(["error"], 100, trigger=trigger)
+    assert "record_ticks" not in node.executed
+
+
+def test_a_trigger_that_does_not_come_is_waited_for_in_the_time_of_the_node():
+    scope = scope_of(node_of())
+    scope.start(["error"], 100, trigger=Trigger("rises", "error", "1mm"))
+    begun = scope.now_s()
+    with pytest.raises(NotRecorded, match="was not triggered within 250ms"):
+        scope.read(timeout="250ms")
+    assert 0.25 < scope.now_s() - begun < 0.5
+
+
+def test_a_stream_has_every_sample_once_for_as_long_as_it_is_to_last():
+    node = node_of()
+    scope = scope_of(node)
+    records = list(scope.stream(("error", "target"), "500us", "300ms"))
+    assert len(records) > 1 and sum(len(one.time_s) for one in records) == 600
+    times = [time for one in records for time in one.time_s]
+    assert times == pytest.approx([n * 0.0005 for n in range(600)])
+    errors = [error for one in records for error in one.values["error"]]
+    assert all(after - before == -6 for before, after in zip(errors, errors[1:]))
+
+
+def test_a_stream_that_is_not_read_in_time_ends_with_what_the_memory_holds():
+    node = node_of()
+    scope = scope_of(node)
+    stream = scope.stream(["error"])
+    got = len(next(stream).time_s)
+    node.run(WORDS)
+    with pytest.raises(NotRecorded, match="stream fewer signals"):
+        for record in stream:
+            got += len(record.time_s)
+    assert WORDS <= got < WORDS + 50
+
+
 @pytest.mark.parametrize(
     "wrong, message",
     [
@@ -115,9 +197,8 @@ def test_what_was_not_recorded_is_refused():
     node = node_of()
     scope = scope_of(node)
     scope.start(["error"], 50)
-    node.scope.recording = False
+    node.run(1)
     node.scope.tick = lambda axes: None
-    node.scope.recording = True
     with pytest.raises(NotRecorded, match="did not come to its end"):
         scope.read()
     node = node_of()
@@ -180,4 +261,14 @@ def test_scope_record_and_save_write_files_with_units(tmp_path):
         "command_of_full_scale",
         "position_nm",
     ]
+    call = Call(
+        "scope record --signals velocity --trigger rises --of command --level=-45% --before 5 "
+        f"--samples 20 -- scope save {table} --timeout 2s -- "
+        f"scope stream {tmp_path / 'b.csv'} --signals error --every 1ms --time 50ms".split(),
+        node_of(),
+    )
+    assert call.code == 0, call.err
+    assert "5 of them before the trigger" in call.out and "1000 words/s without a gap" in call.out
+    assert parquet.read_table(table)["time_s"].to_pylist()[5] == 0
+    assert len((tmp_path / "b.csv").read_text().splitlines()) == 51
     assert "no signal 'sped'" in sentence(Call("scope record --signals sped", node_of()), 2)

@@ -75,6 +75,25 @@ def test_speeds_accelerations_and_times_are_read():
     assert units.NUMBER.parse("0.25") == Fraction(1, 4)
 
 
+@pytest.mark.parametrize(
+    "quantity, text, value",
+    [
+        (units.TIME, "1ns", Fraction(1, 1_000_000_000)),
+        (units.TIME, "1us", Fraction(1, 1_000_000)),
+        (units.TIME, "1ms", Fraction(1, 1000)),
+        (units.TIME, "1s", 1),
+        (units.ANGLE, "1arcsec", 1),
+        (units.ANGLE, "1arcmin", 60),
+        (units.ANGLE, "1deg", 3600),
+        (units.FREQUENCY, "1Hz", 1),
+        (units.FREQUENCY, "1kHz", 1000),
+        (units.FREQUENCY, "1MHz", 1_000_000),
+    ],
+)
+def test_each_unit_has_its_worth(quantity, text, value):
+    assert quantity.parse(text) == value
+
+
 def test_a_wrong_speed_is_refused_with_what_is_allowed():
     with pytest.raises(
         UnitError,
@@ -91,13 +110,21 @@ def test_numbers_are_written_as_people_read_them():
     assert units.format_length(999) == "999nm"
     assert units.format_length(1000) == "1um"
     assert units.format_length(123456789.25, 6) == "123.457mm"
+    assert units.format_length(Fraction(1234567894, 1000)) == "1.23456789mm"
+    assert units.format_length(Fraction(1, 20000)) == "0.05pm"
     assert units.format_speed(Fraction(48, 10)) == "4.8mm/s"
+    assert units.format_speed(Fraction(12345678, 10**7)) == "1.23457mm/s"
+    assert units.format_time(Fraction(12345678, 10**7)) == "1.23457s"
     assert units.format_time(Fraction(1, 50)) == "20ms"
     assert units.decimal(Fraction(1, 65536)) == "0.0000152587890625"
     assert units.decimal(Fraction(-5, 4)) == "-1.25"
     assert units.decimal(100) == "100"
+    assert units.decimal(Fraction(1, 125)) == "0.008"
+    assert units.decimal(Fraction(1, 3)) == "0.333333333333333"
     assert units.rounded(Fraction(2, 3), 3) == "0.667"
     assert units.rounded(1999999, 3) == "2000000"
+    assert units.rounded(Fraction(2, 300), 3) == "0.00667"
+    assert units.rounded(Fraction(912345, 10**9), 3) == "0.000912"
 
 
 @pytest.mark.parametrize(

@@ -38,12 +38,13 @@ class PacketReceiver:
         accepted = int(self.verdict == "accepted")
         return accepted, self.bank, self.refused, put, count // 4 if put else None, word
 
-    def judge(self, enable, session, writes, time_window, now, broken, busy):
+    def judge(self, enable, session, writes, time_window, now, broken, foreign, busy):
         content = bytes(self.bytes)
         if self.lost or broken or zlib.crc32(content) != WHOLE:
             return "damaged"
         identity = layout.KIND_REQUEST | session << 8
-        if self.missed or not enable or int.from_bytes(content[:4], "little") != identity:
+        ours = int.from_bytes(content[:4], "little") == identity
+        if self.missed or not enable or foreign or not ours:
             return "foreign"
         if len(content) != 4 * (writes + layout.FRAME_WORDS):
             return "wrong_length"
@@ -54,7 +55,7 @@ class PacketReceiver:
             return "out_of_time"
         return "busy" if busy else "accepted"
 
-    def step(self, enable, session, writes, time_window, now, valid, data, ends, broken, busy, rst):
+    def step(self, valid, data, ends, broken, rst, enable, **others):
         if rst:
             return self.reset()
         if self.verdict == "accepted":
@@ -66,7 +67,7 @@ class PacketReceiver:
         self.verdict = None
         if ends:
             if self.bytes or self.lost or broken:
-                self.verdict = self.judge(enable, session, writes, time_window, now, broken, busy)
+                self.verdict = self.judge(enable, broken=broken, **others)
             self.bytes, self.lost, self.missed = bytearray(), 0, 0
             return None
         self.lost |= broken

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""link_port: requests of the host's codec on its serial line are answered there and reach the
-register bus; damaged lines; the watchdog; and a node without it. Its blocks have models of their
-own.
+"""link_port: requests of the host's codec on its serial line or in datagrams are answered there and
+reach the register bus; damaged lines; the watchdog; and a node without it. Its blocks have models
+of their own.
 """
 
 import random
@@ -22,6 +22,9 @@ BIT = 5  # cycles: 12 Mbaud at 60 MHz
 TURNAROUND = 2  # bits
 CLK_HZ = 1_000_000
 IDLE = dict(select=0, write=0, word=0, wdata=0, ready=1, link_rdata=0, now=0, link_rx=1)
+IDLE |= dict(drive_on=0, udp_rx_valid=0, udp_rx_data=0, udp_rx_last=0, udp_rx_error=0)
+IDLE |= dict(udp_rx_sender=0, udp_tx_ready=1)
+HOST = 0xC0A8_0101_0FA0  # address and port
 
 
 class Port:
@@ -30,6 +33,7 @@ class Port:
     def __init__(self, dut):
         self.dut, self.receiver, self.heard = dut, UartRx(0, 4), bytearray()
         self.registers, self.answers, self.now = {}, [0, 0], 0
+        self.drive_on, self.datagrams = 0, [bytearray()]
         self.driven, self.drops = 0, 0  # driver enable now, and how often it fell
 
     async def clk(self, rx=1, **inputs):
@@ -39,7 +43,16 @@ class Port:
         assert driven or int(dut.link_tx.value), "the line is idle without the driver"
         self.drops += self.driven and not driven
         self.driven = driven
-        inputs = IDLE | {"now": self.now, "link_rx": rx, "link_rdata": self.answers.pop(0)} | inputs
+        inputs = (
+            IDLE
+            | {
+                "drive_on": self.drive_on,
+                "now": self.now,
+                "link_rx": rx,
+                "link_rdata": self.answers.pop(0),
+            }
+            | inputs
+        )
         for name, level in inputs.items():
             getattr(dut, name).value = level
         await ReadOnly()
@@ -53,7 +66,30 @@ class Port:
         valid, byte, *_ = self.receiver.step(int(dut.link_tx.value), 16 * BIT)
         if valid:
             self.heard.append(byte)
+        if int(dut.udp_tx_valid.value):
+            self.datagrams[-1].append(int(dut.udp_tx_data.value))
+            if int(dut.udp_tx_last.value):
+                assert int(dut.udp_tx_length.value) == len(self.datagrams[-1])
+                self.datagrams.append(bytearray())
         await FallingEdge(dut.clk)
+
+    async def datagram(self, content, sender=HOST, error=0):
+        """A datagram, and the one that answers it: (receiver, content); None if there is none."""
+        self.datagrams = [bytearray()]
+        for n, byte in enumerate(content):
+            last = int(n == len(content) - 1)
+            await self.clk(
+                udp_rx_valid=1,
+                udp_rx_data=byte,
+                udp_rx_last=last,
+                udp_rx_error=error and last,
+                udp_rx_sender=sender,
+            )
+        for _ in range(200):
+            await self.clk()
+        if len(self.datagrams) < 2:
+            return None
+        return int(self.dut.udp_tx_receiver.value), bytes(self.datagrams[0])
 
     async def write(self, register, **values):
         """A register of the port by its fields."""
@@ -106,13 +142,17 @@ async def begin(dut):
     return port
 
 
-def has_link(dut):
-    needs(int(dut.BUILT.value), "a node without a link")
+def has_line(dut):
+    needs(int(dut.BUILT.value) and not int(dut.UDP.value), "a node without a link on a line")
+
+
+def has_datagrams(dut):
+    needs(int(dut.BUILT.value) and int(dut.UDP.value), "a node without a link in datagrams")
 
 
 @cocotb.test()
 async def requests_on_the_line_are_played_and_answered(dut):
-    has_link(dut)
+    has_line(dut)
     port = await begin(dut)
     host = await port.set_up()
     for value in range(3):
@@ -129,7 +169,7 @@ async def requests_on_the_line_are_played_and_answered(dut):
 
 @cocotb.test()
 async def a_damaged_line_is_counted_and_the_next_request_is_answered(dut):
-    has_link(dut)
+    has_line(dut)
     port = await begin(dut)
     host = await port.set_up()
     packet = host.request(0, [1, 2])
@@ -151,7 +191,7 @@ async def a_damaged_line_is_counted_and_the_next_request_is_answered(dut):
 
 @cocotb.test()
 async def the_watchdog_expires_without_requests_and_only_while_the_link_is_on(dut):
-    has_link(dut)
+    needs(int(dut.BUILT.value), "a node without a link")
     port = await begin(dut)
     await port.set_up(enable=0)
     for _ in range(21_000):
@@ -174,6 +214,39 @@ async def without_a_link_nothing_answers_and_nothing_is_accessed(dut):
     assert not int(dut.watchdog_expired.value)
 
 
-@pytest.mark.parametrize("built", [1, 0])
-def test_link_port(built):
-    run("link_port", __file__, CLK_HZ=CLK_HZ, BUILT=built)
+@cocotb.test()
+async def requests_in_datagrams_are_played_and_answered_to_their_sender(dut):
+    has_datagrams(dut)
+    port = await begin(dut)
+    host = await port.set_up()
+    for value in range(3):
+        request = host.request(0, [value, 7], Spare(0x500, 33))
+        receiver, content = await port.datagram(request, HOST + value)
+        reply = host.reply(content)
+        assert receiver == HOST + value
+        assert reply and reply.values == (0x411, 0x415) and not any(reply.refused.values())
+        assert port.registers == {0x400: value, 0x404: 7, 0x500: 33}
+    assert (int(dut.link_tx.value), int(dut.link_driver_enable.value)) == (1, 0)
+
+
+@cocotb.test()
+async def while_a_drive_is_on_datagrams_of_others_and_damaged_ones_are_refused(dut):
+    has_datagrams(dut)
+    port = await begin(dut)
+    host = await port.set_up()
+    assert await port.datagram(host.request(0, [1, 2]))
+    port.drive_on = 1
+    request = host.request(0, [3, 4])
+    assert await port.datagram(request, HOST ^ 1) is None
+    assert await port.datagram(request, error=1) is None
+    assert port.registers == {0x400: 1, 0x404: 2}
+    _, content = await port.datagram(request)
+    refused = host.reply(content).refused
+    assert (refused["foreign"], refused["damaged"]) == (1, 1)
+    assert port.registers == {0x400: 3, 0x404: 4}
+    assert await port.read("framing_errors") == dict(value=0)
+
+
+@pytest.mark.parametrize("built, udp", [(1, 0), (1, 1), (0, 0)])
+def test_link_port(built, udp):
+    run("link_port", __file__, CLK_HZ=CLK_HZ, BUILT=built, UDP=udp)

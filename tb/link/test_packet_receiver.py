@@ -25,10 +25,10 @@ class Receiver:
         self.settings = {"enable": 1, "session": SESSION, "writes": 2, "time_window": 0}
         self.now = self.busy = self.put = 0
 
-    async def clk(self, valid=0, data=0, ends=0, broken=0, rst=0):
+    async def clk(self, valid=0, data=0, ends=0, broken=0, foreign=0, rst=0):
         """One cycle; returns accepted."""
         inputs = {"valid": valid, "data": data, "ends": ends, "broken": broken, "rst": rst}
-        inputs |= self.settings | {"now": self.now, "busy": self.busy}
+        inputs |= self.settings | {"now": self.now, "busy": self.busy, "foreign": foreign}
         for name, level in inputs.items():
             getattr(self.dut, name).value = level
         await ReadOnly()
@@ -44,14 +44,14 @@ class Receiver:
         await FallingEdge(self.dut.clk)
         return want[0]
 
-    async def send(self, packet, gap=0, broken_at=None):
+    async def send(self, packet, gap=0, broken_at=None, foreign=0):
         """Send a packet; returns what became of it: accepted, or a cause."""
         before = dict(self.model.counts)
         for n, byte in enumerate(packet):
             await self.clk(1, byte, broken=n == broken_at)
             for _ in range(gap and random.randrange(gap)):
                 await self.clk()
-        await self.clk(ends=1)
+        await self.clk(ends=1, foreign=foreign)
         accepted = await self.clk()
         assert not await self.clk()
         more = [name for name in NAMES if self.model.counts[name] != before[name]]
@@ -61,7 +61,7 @@ class Receiver:
 
 async def begin(dut):
     idle = ("enable", "session", "writes", "time_window", "now", "valid", "data", "ends")
-    await start(dut, **dict.fromkeys((*idle, "broken", "busy"), 0))
+    await start(dut, **dict.fromkeys((*idle, "broken", "foreign", "busy"), 0))
     await FallingEdge(dut.clk)
     receiver = Receiver(dut)
     await receiver.clk(rst=1)
@@ -86,6 +86,7 @@ async def a_request_is_accepted_once_and_each_cause_is_counted_alone(dut):
     assert await receiver.send(host.request(0, [1, 2]), broken_at=9) == "damaged"
     other = Link(SESSION ^ 1, 2, 1)
     assert await receiver.send(other.request(0, [1, 2])) == "foreign"
+    assert await receiver.send(host.request(0, [1, 2]), foreign=1) == "foreign"
     reply = sealed([layout.KIND_REPLY | SESSION << 8, 9, 0, 1, 2, 0, 0])
     assert await receiver.send(reply) == "foreign"
     for writes in (1, 3, layout.MOST_VALUES):
@@ -200,7 +201,12 @@ async def any_traffic_matches_the_model(dut):
         packet = bytearray(host.request(time, [random.getrandbits(32)] * writes))
         if random.random() < 0.2:
             packet[random.randrange(len(packet))] ^= 1 << random.randrange(8)
-        await receiver.send(packet, random.choice([0, 3]), random.choice([None, None, 2, 300]))
+        await receiver.send(
+            packet,
+            random.choice([0, 3]),
+            random.choice([None, None, 2, 300]),
+            random.choice([0, 0, 0, 1]),
+        )
         if random.random() < 0.05:
             await receiver.clk(1, 0x51, rst=1)
 

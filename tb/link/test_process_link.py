@@ -31,6 +31,7 @@ INPUTS = {
     "rx_data": 0,
     "rx_ends": 0,
     "rx_broken": 0,
+    "rx_foreign": 0,
     "tx_taken": 1,
     "ready": 1,
     "rdata": 0,
@@ -58,7 +59,8 @@ class Node:
         traffic = {"enable": enable, "valid": inputs["rx_valid"], "data": inputs["rx_data"]}
         accepted, bank, refused, put, put_at, word = self.receiver.outputs(**traffic)
         want = dict(zip(NAMES, self.player.outputs(), strict=True))
-        for name, level in (want | {"refused": refused, "expired": self.expired}).items():
+        others = {"refused": refused, "expired": self.expired, "accepted": accepted}
+        for name, level in (want | others).items():
             if level is not None and self.cycles:
                 got = int(getattr(self.dut, name).value)
                 assert got == level, f"cycle {self.cycles}: {name} is {got:#x}, not {level:#x}"
@@ -81,6 +83,7 @@ class Node:
             now=now,
             ends=inputs["rx_ends"],
             broken=inputs["rx_broken"],
+            foreign=inputs["rx_foreign"],
             busy=want["busy"],
             rst=rst,
         )
@@ -147,6 +150,18 @@ async def a_request_is_played_and_answered_and_a_repeated_one_is_not(dut):
     assert not node.registers and len(node.replies) == 1
     await node.send(host.request(node.levels["now"], [1, 2]))
     assert host.reply(await node.answered()).refused["replayed"] == 1
+
+
+@cocotb.test()
+async def a_request_that_the_carrier_calls_foreign_changes_nothing(dut):
+    node, host = await begin(dut)
+    for byte in host.request(node.levels["now"] + 40, [11, 22]):
+        await node.clk(rx_valid=1, rx_data=byte)
+    await node.clk(rx_ends=1, rx_foreign=1)
+    for _ in range(50):
+        await node.clk()
+    assert not node.registers and len(node.replies) == 1
+    assert node.receiver.counts["foreign"] == 1
 
 
 @cocotb.test()

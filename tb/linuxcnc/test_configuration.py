@@ -2,13 +2,15 @@
 """The generator of configurations for LinuxCNC, and the set-up of a link."""
 
 import re
+from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from linuxcnc_config.__main__ import main
 from linuxcnc_config.generate import Misfit, load, texts
 from linuxcnc_config.lists import READS, WRITES
-from linuxcnc_config.set_up import Unfit, set_up
+from linuxcnc_config.set_up import Backlash, Unfit, set_up
 from linuxcnc_config.set_up import main as set_up_program
 from moire.client.link import places
 from moire.made import link_tables as layout
@@ -51,6 +53,20 @@ def test_the_configuration_has_the_numbers_of_the_machine_file(tmp_path):
     assert 'node="serial:/dev/ttyUSB1:3000000" axes=1 session=' in made["mill.hal"]
 
 
+def test_the_backlash_of_a_machine_file_comes_to_the_set_up(tmp_path, monkeypatch):
+    features = ('drives = ["stepper"]', 'drives = ["stepper"]\nfeatures = ["backlash"]')
+    found = written(tmp_path, features)
+    text = Path(found).read_text()
+    Path(found).write_text(text + 'backlash_um = 2.5\ntake_up = 8\nsensor = "motor"\n')
+    line = texts(load(found))["mill.hal"].split("set_up", 1)[1].splitlines()[0]
+    assert line.endswith(" --backlash 0:2.5um:8.0mm/s:0.25um:motor")
+    assert Backlash.parsed(line.split()[-1]) == (0, Backlash("2.5um", "8.0mm/s", "0.25um", True))
+    axis = Mock()
+    monkeypatch.setattr("linuxcnc_config.set_up.Axis", axis)
+    set_up(IdealNode(1), 1, 5, backlash={0: Backlash("2.5um", "8mm/s", "1um", True)})
+    axis().set_backlash.assert_called_once_with("2.5um", "8mm/s", "1um", True)
+
+
 def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(tmp_path):
     found = load(written(tmp_path))
     sessions = [re.findall(r"session[ =](\d+)", texts(found)["mill.hal"]) for _ in range(3)]
@@ -70,6 +86,13 @@ def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(
         (('name = "X"', 'name = "left"'), "name 'left': LinuxCNC knows the axes X, Y, Z"),
         (("serial:/dev/ttyUSB1:3000000", "ttyUSB1"), "write udp:HOST:PORT or serial:DEVICE:BAUD"),
         (('node = "serial', 'delay_ms = 2\nnode = "serial'), "delay_ms 2: a set-point needs 4"),
+        (
+            ("velocity = 50", "velocity = 50\nbacklash_um = 5"),
+            "backlash_um needs the feature backlash of the axis",
+        ),
+        (("velocity = 50", "velocity = 50\nbacklash_um = -1"), "backlash_um -1 with take_up 1:"),
+        (("velocity = 50", "velocity = 50\ntake_up = 0"), "backlash_um 0 with take_up 0:"),
+        (("velocity = 50", 'velocity = 50\nsensor = "wheel"'), "sensor 'wheel' is none of table,"),
         (("[axis.linuxcnc]", "[axis.other]"), "there is no key other"),
         (('drives = ["stepper"]', ""), "no axis has a drive: LinuxCNC has nothing to move"),
     ],
@@ -125,5 +148,8 @@ def test_the_set_up_refuses_a_node_without_a_link():
 
 def test_the_set_up_program_says_in_a_line_why_it_fails(capsys):
     line = ["--port", "/dev/no_such_port", "--axes", "3", "--session", "5"]
+    with pytest.raises(SystemExit):
+        set_up_program([*line, "--backlash", "0:5um"])
+    assert "--backlash needs five parts" in capsys.readouterr().err
     assert set_up_program(line) == 1
     assert re.fullmatch(r"moire: /dev/no_such_port: .*\n", capsys.readouterr().err)

@@ -42,7 +42,7 @@ def run(folder, served, steps, programs=None):
     """LinuxCNC with the mill at a served node."""
     set_up(served.node, len(served.node.axes), SESSION)
     node = f"udp:127.0.0.1:{served.port}"
-    mill = replace(load("mill"), bus="", node=node, session=SESSION, simulated=True)
+    mill = replace(load("mill_linuxcnc"), bus="", node=node, session=SESSION, simulated=True)
     texts = {f"{name}.ngc": program.text() for name, program in (programs or {}).items()}
     return headless.run(mill, folder, steps, texts)
 
@@ -163,7 +163,7 @@ def test_a_serial_port_of_another_program_is_refused_in_a_sentence(tmp_path):
     os.fchmod(slave, 0o666)
     fcntl.flock(slave, fcntl.LOCK_EX)
     port = f"serial:{os.ttyname(slave)}:3000000"
-    mill = replace(load("mill"), bus="", node=port, session=SESSION)
+    mill = replace(load("mill_linuxcnc"), bus="", node=port, session=SESSION)
     ran = headless.run(mill, tmp_path, [["on"]])
     os.close(master)
     os.close(slave)
@@ -175,6 +175,6 @@ def test_linuxcnc_does_not_start_where_the_set_up_fails(tmp_path):
     program = tmp_path / "set_up"
     program.write_text("#!/bin/sh\necho moire: it does not fit >&2\nexit 1\n")
     program.chmod(0o755)
-    mill = replace(load("mill"), bus="/dev/ttyUSB0", python="./set_up")
+    mill = replace(load("mill_linuxcnc"), bus="/dev/ttyUSB0", python="./set_up")
     ran = headless.run(mill, tmp_path, [["on"]])
     assert ran.exit_code != 0 and "moire: it does not fit" in ran.printed

@@ -286,5 +286,5 @@ async def a_recorded_keyboard_passes_and_sigrok_reads_it_with_the_injection_afte
 
 def test_ps2_pass():
     if not RECORDING.exists() or not shutil.which("sigrok-cli"):
-        print("no recording or no sigrok-cli: one test is skipped")
+        print("no recording or no sigrok-cli (make sigrok): one test is skipped")
     bench.run("ps2_pass", __file__, CLK_HZ=CLK_HZ)

@@ -285,6 +285,65 @@ def test_inputs_without_a_pin_have_the_level_at_which_nothing_happens(tmp_path):
 S0 = "constraints/machines/s0.toml"
 
 
+def over_ethernet(folder, address="192.168.1.50", more=""):
+    """The mill with its link over Ethernet."""
+    table = f'[node.ethernet]\naddress = "{address}"\n{more}\n[linuxcnc]'
+    return edited(folder, "constraints/machines/mill.toml", ("[linuxcnc]\nbus", f"{table}\nbus"))
+
+
+def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(tmp_path):
+    design = fit(board.named("colorlight_i5"), machine.load(over_ethernet(tmp_path)))
+    assert (design.parameters["HAS_LINK"], design.parameters["LINK_UDP"]) == (1, 1)
+    made = generate.files(design)
+    assert f".mac_address(48'd{0x024D_C0A8_0132})," in made["top.sv"]
+    assert f".ip_address(32'd{0xC0A8_0132}),  // 192.168.1.50" in made["top.sv"]
+    assert ".udp_rx_sender(ethernet_udp_rx_sender)" in made["top.sv"]
+    assert (
+        ".pads_rx_data({eth_rx_data_3, eth_rx_data_2, eth_rx_data_1, eth_rx_data_0})"
+        in (made["top.sv"])
+    )
+    assert 'FREQUENCY PORT "eth_rx_clk" 125.0 MHZ;' in made["pins.lpf"]
+    for port, ball in (("eth_rx_clk", "H2"), ("eth_tx_ctl", "K1"), ("eth_tx_data_3", "J3")):
+        assert f'LOCATE COMP "{port}" SITE "{ball}";' in made["pins.lpf"]
+    plain = generate.files(fit(board.named("colorlight_i5"), machine.named("mill")))
+    assert "eth_" not in plain["pins.lpf"] and "ethernet_core" not in plain["top.sv"]
+
+
+@pytest.mark.parametrize(
+    "address, more, words",
+    [
+        ("192.168.1", "", "[node.ethernet] address '192.168.1' is no IP address such as"),
+        ("224.0.0.1", "", "[node.ethernet] address '224.0.0.1' is none that a node may have"),
+        ("192.168.1.50", "dhcp = true", "[node.ethernet] there is no key dhcp"),
+    ],
+)
+def test_a_wrong_address_is_refused(address, more, words, tmp_path):
+    path = over_ethernet(tmp_path, address, more)
+    assert refusal(lambda: machine.load(path)).startswith(f"{path}: {words}")
+
+
+def test_a_link_over_ethernet_needs_a_phy_and_no_serial_line(tmp_path):
+    path = over_ethernet(tmp_path)
+    found = refusal(lambda: fit(board.named("ulx3s_85f"), machine.load(path)))
+    assert found.startswith(f"{path}: [node.ethernet] needs a board with an Ethernet PHY")
+    both = tmp_path / "both.toml"
+    both.write_text(path.read_text().replace("[node]", '[node]\nperipherals = ["link"]'))
+    assert "a node has one of them" in refusal(lambda: machine.load(both))
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ('interface = "rgmii"', 'interface = "mii"', "interface 'mii' is none of rgmii"),
+        ('"K2", "L1", "N1", "P1"', '"K2", "L1", "N1"', "rx_data must name 4 pins"),
+        ('tx_clk = ["G1"]', 'tx_clk = ["ZZ"]', "has no pin ZZ"),
+    ],
+)
+def test_a_wrong_phy_is_refused(old, new, words, tmp_path):
+    path = edited(tmp_path, "constraints/colorlight_i5/board.toml", (old, new))
+    assert words in refusal(lambda: board.load(path))
+
+
 def test_a_recorder_of_ticks_is_built_where_its_memory_has_room(tmp_path):
     path = edited(tmp_path, S0, ("filters = 2\n", "filters = 2\nscope_words = 16384\n"))
     found = fit(board.named("ulx3s_85f"), machine.load(path))
@@ -442,9 +501,13 @@ def test_the_costs_of_features_are_those_that_the_page_lists():
     )
     words = {"segments": "segment table", "monitor": "signal monitor", "fine_stage": "fine stage"}
     words |= {"capture": "capture queue", "encoder_check": "check of the encoder"}
+    words |= {"backlash": "compensation of backlash"}
     for name, lut in size.FEATURES.items():
         assert int(rows[words.get(name, name)]) == lut, name
     assert int(rows["step generator"]) == size.STEPPER
+    assert int(rows["real-time link"]) == size.LINK
+    assert int(rows["set-points of one axis"]) == size.SET_POINTS
+    assert int(rows["set-points of each further axis"]) == size.SET_POINTS_AXIS
     assert f"take {size.PERIPHERALS} LUT4" in (ROOT / "docs" / "peripherals.md").read_text()
     assert str(size.STEP_NODE) in rows.values() and str(size.SINE_NODE) in rows.values()
     assert str(size.STEP_AXIS) in rows.values() and str(size.SINE_AXIS) in rows.values()
@@ -462,6 +525,25 @@ def test_the_block_rams_are_those_of_netlists(tmp_path):
         "constraints/machines/s0.toml: 1 axis with 96 KiB need about 57 block RAM, but "
         "LFE5U-25F-6BG381C of constraints/ulx3s_25f/board.toml has 56"
     ]
+
+
+def test_a_node_with_set_points_and_the_real_time_link_has_their_size():
+    """Three axes, synthesised: 13 996 LUT4 with the set-points, 9464 without."""
+    plain, stream = (
+        size.estimate("ecp5", machine.named(name)) for name in ("mill", "mill_linuxcnc")
+    )
+    more = size.LINK + 3 * size.FEATURES["backlash"]
+    assert stream.lut - plain.lut - more == 13_996 - 9464 + 1
+    assert stream.block_ram == plain.block_ram
+
+
+def test_a_part_that_is_too_small_for_set_points_is_refused(tmp_path):
+    needed = size.estimate("ecp5", machine.named("mill_linuxcnc")).lut
+    change = ("lut = 24288", f"lut = {needed - 1}")
+    path = edited(tmp_path, "constraints/colorlight_i5/board.toml", change)
+    assert fit(board.load(path), machine.named("mill"))
+    found = refusal(lambda: fit(board.load(path), machine.named("mill_linuxcnc")))
+    assert f"3 axes with 64 KiB need about {needed} LUT, but" in found
 
 
 # Pins of others
@@ -703,6 +785,11 @@ def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
             'name = "Y"',
             'name = "Y"\nfeatures = ["lasers"]',
             "[axis 2] features: 'lasers' is none of sine, ",
+        ),
+        (
+            'name = "Y"',
+            'name = "Y"\nfeatures = ["set_points"]',
+            "the feature set_points of axis Y needs image stream or steps_stream: steps does not",
         ),
         ("[between.estop]", "[between.stop]", "[between] stop is none of adc, bridge, "),
         (

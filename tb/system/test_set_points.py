@@ -9,7 +9,7 @@ import random
 import pytest
 
 from moire.client.bus import Bus
-from moire.errors import Refused
+from moire.errors import OutOfRange, Refused
 from moire.made.bus_tables import CAUSES
 from tb.bench import seed
 from tb.control.set_point_piece import piece_of, played
@@ -18,7 +18,9 @@ from twin import Twin, TwinTransport, build
 from twin.nodes.twin import NODE, Node, drives
 from twin.nodes.twin import Axis as Machine
 
-PARAMETERS = NODE | drives("HAS_BRIDGE", "HAS_STEPPER") | {"HAS_SET_POINTS": 255}
+PARAMETERS = (
+    NODE | drives("HAS_BRIDGE", "HAS_STEPPER") | {"HAS_SET_POINTS": 255, "HAS_BACKLASH": 255}
+)
 TOP = (1 << 46, 1 << 46)  # no limits: the model of a path that was accepted
 INTERVAL = 240  # ticks, 60 ms: four writes at 115 200 baud take some 25 ms
 POINTS = 10  # intervals of a wave
@@ -185,6 +187,41 @@ def test_an_axis_follows_a_streamed_wave_tick_by_tick_and_is_released_at_rest(ho
     assert abs(host.read("axis.target") - host.points[0][1]) <= 1
     host.axis.move(nm=10_000)  # a profile of its own
     host.request(enable=0, home=0)
+
+
+def table_um(host, *targets_um):
+    """True positions of the table after moves to these targets."""
+    found = []
+    for target in targets_um:
+        host.axis.move(nm=1000 * target)
+        found.append(host.twin.truth(1).position_m * 1e6 - target)
+    return found
+
+
+def test_without_a_scale_the_backlash_of_a_screw_is_taken_up_at_each_reversal(hosts):
+    """The screw has 5 um; a step is 1.25 um."""
+    host = hosts[STEPPER_ADDRESS]
+    host.request(enable=1)
+    host.request(home=1)
+    host.until(lambda: host.read("axis.supervision")["homed"] and host.status() == "holding")
+    up, down = table_um(host, 0, 100, 50)[1:]
+    assert 4 < down - up < 6
+    host.axis.set_backlash("5um", "10mm/s", "0.5um", motor_side=True)
+    up, down = table_um(host, 0, 100, 50)[1:]
+    assert abs(down - up) < 1
+    position = host.axis.status()
+    assert abs(position.position_nm - 50_000) < 1250  # it is that of the table
+    built = host.node.read_named("feedback.backlash_rate")
+    assert built["motor_side"] == 1 and built["value"] == round(10e6 / 5000 * 65536 / 4000)
+    host.axis.set_backlash(0, "10mm/s", 0)
+
+
+@pytest.mark.parametrize(
+    "settings", [("-1um", 1, 0), ("2mm", 1, 0), (0, 0, 0), (0, "9m/s", 0), (0, 1, "5um")]
+)
+def test_a_backlash_outside_its_range_is_refused(host, settings):
+    with pytest.raises(OutOfRange, match="the backlash must be 0 to 0.2"):
+        host.axis.set_backlash(*settings)
 
 
 def test_a_late_stream_stops_under_control_and_says_so(host):

@@ -148,6 +148,23 @@ def test_a_variable_of_two_types_is_refused(tmp_path):
         rising_edge.Design.read(tmp_path)
 
 
+def test_variables_of_two_functions_may_have_one_name():
+    code = "".join(
+        FUNCTION.format(root=rising_edge.ROOT, name=name, lines="\n".join(lines))
+        for name, lines in {
+            "f": ["CData/*0:0*/ x;", "x = a;", f"{rising_edge.ROOT}___g(vlSelf);", "b = x;"],
+            "g": ["IData/*31:0*/ x;", "x = c;"],
+        }.items()
+    )
+    assert rising_edge.body(code, "f") == [
+        "CData/*0:0*/ x;",
+        "x = a;",
+        "IData/*31:0*/ x_of_g;",
+        "x_of_g = c;",
+        "b = x;",
+    ]
+
+
 def signals(folder: Path) -> str:
     """The lists of signals of rising_edge_run.cpp: the inputs, and what an edge leaves behind."""
     header = (folder / f"{rising_edge.ROOT}.h").read_text()

@@ -94,6 +94,9 @@ module axis_on_wishbone #(
     wire chain_harmonic_enable, chain_learn, sample_valid;
     wire signed [W-1:0] sample_sin, sample_cos;
     wire signed [31:0] quadrature_count;
+    wire        [47:0] target;
+    wire [15:0] phase, fine_command;
+    wire [12:0] faults;
 
     wishbone_port u_port (
         .clk,
@@ -373,6 +376,10 @@ module axis_on_wishbone #(
         .chain_overspeed   (1'b0),
         .chain_disagreement(1'b0),
         .chain_lost        (1'b0),
+        .target,
+        .phase,
+        .fine_command,
+        .faults,
         .encoder_a,
         .encoder_b,
         .encoder_z,
@@ -401,6 +408,7 @@ module axis_on_wishbone #(
         1'b0, chain_setting_written, chain_harmonic_enable, chain_learn, sample_valid, sample_sin,
         sample_cos, quadrature_count
     };
+    wire unused_recorder = &{1'b0, target, phase, fine_command, faults};
 endmodule
 
 `default_nettype wire

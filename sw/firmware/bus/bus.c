@@ -203,10 +203,9 @@ static uint8_t write_register(void) {
         register_write(address, value);
         return BUS_CAUSE_OK;
     }
-    if (!of_axis(block, FEEDBACK_BASE)) {
-        const uint8_t cause = image_operation(BUS_OPERATION_WRITE_REGISTER);
-        return cause == BUS_CAUSE_NOT_BUILT ? BUS_CAUSE_NO_SUCH_REGISTER : cause;
-    }
+    uint8_t cause = image_operation(BUS_OPERATION_WRITE_REGISTER);
+    if (cause != BUS_CAUSE_NOT_BUILT) return cause;
+    if (!of_axis(block, FEEDBACK_BASE)) return BUS_CAUSE_NO_SUCH_REGISTER;
     return feedback_write_register(address - block, (block - FEEDBACK_BASE) / FEEDBACK_STRIDE,
                                    value);
 }

@@ -139,6 +139,13 @@ void supervision_work(void) {
     requested = requests;
 }
 
+static bool backlash_register(uint32_t address) {
+    const uint32_t offset = address - FEEDBACK_BASE, n = offset / FEEDBACK_STRIDE,
+                   of_axis = offset % FEEDBACK_STRIDE;
+    return n < axis_count && hardware_built(n, AXIS_BUILT_BACKLASH_MASK) &&
+           (of_axis == FEEDBACK_BACKLASH || of_axis == FEEDBACK_BACKLASH_RATE);
+}
+
 // A register that a host writes over the bus. The low word of a position waits here for the high
 // one, since the firmware writes other wide registers in between.
 uint8_t supervision_operation(uint8_t operation) {
@@ -152,6 +159,10 @@ uint8_t supervision_operation(uint8_t operation) {
     case NODE_BASE + NODE_LATE_LIMIT:
     case NODE_BASE + NODE_AXIS_REQUESTS: register_write(address, value); return BUS_CAUSE_OK;
     default: break;
+    }
+    if (backlash_register(address)) {
+        register_write(address, value);
+        return BUS_CAUSE_OK;
     }
     if (address < AXIS_BASE || n >= axis_count || !hardware_built(n, AXIS_BUILT_SET_POINTS_MASK))
         return BUS_CAUSE_NOT_BUILT;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tick_scope -- records signals of one axis at each servo tick with the recorder of the node, and
-// adds a waveform to the commands of an axis, to measure its response.
+// adds a waveform to the commands of an axis meanwhile, to measure its response.
 #include "bus/tick_scope.h"
 
 #include "axis/axis.h"
@@ -8,26 +8,21 @@
 #include "core/hardware.h"
 #include "made/bus_protocol.h"
 
-#define WORDS 14u   // of a reply
-#define VALUES 24u  // of a request
-#define BLOCK 256u  // words, LSB of NODE_BUILD_SCOPE
-#define SIGNALS ((1u << NODE_SCOPE_SIGNALS_WIDTH) - 1u)
+#define WORDS 14u     // of a reply
+#define VALUES 24u    // of a request
+#define SETTINGS 16u  // bytes of a request to record, which are those of four registers
 
 static struct {
-    uint32_t words;  // of the recording
-    uint32_t read;   // of these
-    uint8_t axis;    // that is excited
-    uint8_t count;   // of its commands: another one ends the excitation
+    uint16_t read;  // words of the recording
+    uint8_t axis;   // that is excited
+    uint8_t count;  // of its commands: one that begins no motion ends the excitation
     bool excites;
 } ticks;
 
-static uint32_t memory_words(void) {
-    return FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_SCOPE) * BLOCK;
-}
+static bool built(void) { return node_read(NODE_BUILD) & NODE_BUILD_SCOPE_MASK; }
 
 void tick_scope_start(unsigned axes) {
     (void)axes;
-    ticks.words = 0;
     ticks.excites = false;
     node_write(NODE_EXCITATION, 0);
 }
@@ -38,46 +33,37 @@ static bool drive_is_on(unsigned n) { return axis_read(n, AXIS_STATE) & AXIS_STA
 
 void tick_scope_work(void) {
     unsigned n = ticks.axis;
-    if (!ticks.excites || (axis_command_count(n) == ticks.count && drive_is_on(n))) return;
+    uint8_t count = axis_command_count(n);
+    if (axis_state(n) == BUS_STATE_MOVING) ticks.count = count;
+    if (!ticks.excites || (count == ticks.count && drive_is_on(n))) return;
     ticks.excites = false;
     node_write(NODE_EXCITATION, 0);
 }
 
-static uint8_t record(unsigned n, uint32_t signals, uint32_t every, uint32_t length) {
-    uint32_t each = 0;
-    for (uint32_t left = signals; left; left &= left - 1u) each++;
-    if (memory_words() == 0) return BUS_CAUSE_NOT_BUILT;
-    if (each == 0 || signals > SIGNALS || length == 0 || length > memory_words() / each)
-        return BUS_CAUSE_OUT_OF_RANGE;
-    node_write(NODE_SCOPE, FIELD_PUT(NODE_SCOPE_AXIS, n) | FIELD_PUT(NODE_SCOPE_SIGNALS, signals));
-    node_write(NODE_SCOPE_SAMPLES, FIELD_PUT(NODE_SCOPE_SAMPLES_LENGTH, length) |
-                                       FIELD_PUT(NODE_SCOPE_SAMPLES_EVERY, every));
-    node_write(NODE_SCOPE_STATE, NODE_SCOPE_STATE_START_MASK);
-    ticks.words = length * each;
+static uint8_t record(void) {
+    if (!built()) return BUS_CAUSE_NOT_BUILT;
+    for (uint32_t i = 0; i < SETTINGS; i += 4)
+        node_write(NODE_SCOPE + i, (uint32_t)bus_request_field(BUS_REQUEST_HEAD + i, 4));
     ticks.read = 0;
     return BUS_CAUSE_OK;
 }
 
 static uint8_t read_words(void) {
     uint32_t state = node_read(NODE_SCOPE_STATE);
-    bool full = ticks.words != 0 && (state & NODE_SCOPE_STATE_FULL_MASK);
-    bus_reply_field(BUS_READ_TICKS_REPLY_STATE,
-                    full                                      ? BUS_SCOPE_STATE_FULL
-                    : state & NODE_SCOPE_STATE_RECORDING_MASK ? BUS_SCOPE_STATE_RECORDING
-                                                              : BUS_SCOPE_STATE_EMPTY,
-                    1);
+    uint32_t count = FIELD_GET(state, NODE_SCOPE_STATE_AVAILABLE);
+    if (count > WORDS) count = WORDS;
+    bus_reply_field(BUS_READ_TICKS_REPLY_STATE, FIELD_GET(state, NODE_SCOPE_STATE_PHASE), 1);
     bus_reply_field(BUS_READ_TICKS_REPLY_FIRST, ticks.read, 2);
-    for (uint32_t i = 0; i < WORDS; i++) {
-        bool left = full && ticks.read < ticks.words;
-        bus_reply_field(BUS_READ_TICKS_REPLY_WORD_0 + 4 * i, left ? node_read(NODE_SCOPE_WORD) : 0,
-                        4);
-        ticks.read += left;
-    }
+    bus_reply_field(BUS_READ_TICKS_REPLY_COUNT, count, 1);
+    for (uint32_t i = 0; i < WORDS; i++)
+        bus_reply_field(BUS_READ_TICKS_REPLY_WORD_0 + 4 * i,
+                        i < count ? node_read(NODE_SCOPE_WORD) : 0, 4);
+    ticks.read = (uint16_t)(ticks.read + count);
     return BUS_CAUSE_OK;
 }
 
 static uint8_t load(uint32_t first) {
-    if (memory_words() == 0) return BUS_CAUSE_NOT_BUILT;
+    if (!built()) return BUS_CAUSE_NOT_BUILT;
     for (uint32_t i = 0; i < VALUES && first + i < BUS_WAVEFORM_LONGEST; i++) {
         uint32_t value =
             (uint32_t)bus_request_field(BUS_LOAD_EXCITATION_REQUEST_VALUE_0 + 2 * i, 2);
@@ -89,7 +75,7 @@ static uint8_t load(uint32_t first) {
 
 static uint8_t excite(unsigned n, uint32_t period) {
     uint8_t state = axis_state(n);
-    if (memory_words() == 0) return BUS_CAUSE_NOT_BUILT;
+    if (!built()) return BUS_CAUSE_NOT_BUILT;
     if (period > BUS_WAVEFORM_LONGEST) return BUS_CAUSE_OUT_OF_RANGE;
     if (period && !drive_is_on(n)) return BUS_CAUSE_NOT_ENABLED;
     if (state == BUS_STATE_HOMING || state == BUS_STATE_EXCITED ||
@@ -107,10 +93,7 @@ static uint8_t excite(unsigned n, uint32_t period) {
 uint8_t tick_scope_operation(uint8_t operation) {
     unsigned axis = (unsigned)bus_request_field(BUS_REQUEST_HEAD, 1);
     switch (operation) {
-    case BUS_OPERATION_RECORD_TICKS:
-        return record(axis, (uint32_t)bus_request_field(BUS_RECORD_TICKS_REQUEST_SIGNALS, 1),
-                      (uint32_t)bus_request_field(BUS_RECORD_TICKS_REQUEST_EVERY, 2),
-                      (uint32_t)bus_request_field(BUS_RECORD_TICKS_REQUEST_SAMPLES, 2));
+    case BUS_OPERATION_RECORD_TICKS: return record();
     case BUS_OPERATION_READ_TICKS: return read_words();
     case BUS_OPERATION_LOAD_EXCITATION:
         return load((uint32_t)bus_request_field(BUS_LOAD_EXCITATION_REQUEST_FIRST, 2));

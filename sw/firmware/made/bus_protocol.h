@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xD40D10C0u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xFF461A1Eu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -240,6 +240,18 @@ enum bus_tick_signal {    // bits
     BUS_TICK_SIGNAL_VELOCITY = 1 << 3,    // measured velocity, 2^-16 period per tick
     BUS_TICK_SIGNAL_ERROR = 1 << 4,    // target - position, 2^-16 period
     BUS_TICK_SIGNAL_COMMAND = 1 << 5,    // command to the drive, full scale 2^15
+    BUS_TICK_SIGNAL_POSITION = 1 << 6,    // position, low word, 2^-16 period
+    BUS_TICK_SIGNAL_PHASE = 1 << 7,    // interpolated phase, 2^-16 period
+    BUS_TICK_SIGNAL_FINE_COMMAND = 1 << 8,    // command to the fine stage, full scale 2^15
+    BUS_TICK_SIGNAL_FAULTS = 1 << 9,    // latched faults, bits of a fault
+};
+
+enum bus_tick_trigger {
+    BUS_TICK_TRIGGER_NOW = 0,    // at once
+    BUS_TICK_TRIGGER_RISES = 1,    // it rises to the level
+    BUS_TICK_TRIGGER_FALLS = 2,    // it falls below the level
+    BUS_TICK_TRIGGER_BEYOND = 3,    // its size reaches the level
+    BUS_TICK_TRIGGER_BITS = 4,    // it has a bit of the level
 };
 
 enum bus_turn_phase {
@@ -472,7 +484,7 @@ enum bus_operation {
     // of signal_fault)
     BUS_OPERATION_SIGNAL = 18,
     // one word of the register map: only index, capture and compare of the feedback channels, and
-    // in the image `stream` the set-points and requests of a host
+    // in images that play streams the set-points and requests of a host
     BUS_OPERATION_WRITE_REGISTER = 19,
     BUS_OPERATION_PREPARE = 20,    // plan a motion to a position, and wait for start
     // start the prepared motions of these axes (bit n: axis n) in the same tick; none starts if one
@@ -501,18 +513,22 @@ enum bus_operation {
     // five samples from this one on, 0 after the end; time between two samples in 64 cycles,
     // position: low word
     BUS_OPERATION_READ_SCOPE = 33,
-    // record signals of an axis at each servo tick, or one tick in so many: bits of a tick_signal,
-    // so many samples; while an excitation runs, the recording begins with its first value
+    // record signals of an axis (bits of a tick_signal) at each servo tick, or one tick in so many.
+    // The trigger is a tick_signal (bits 0 to 3) and a tick_trigger (bits 4 to 6); so many samples
+    // are from before it, or the first one comes so many ticks after it, with the first value of an
+    // excitation. With 0 samples the recording has no end and is read while it goes on. What does
+    // not fit into the memory ends it
     BUS_OPERATION_RECORD_TICKS = 28,
-    // progress of that recording (a scope_state); once it is complete, its next words, in order
-    // from `first` on: for each sample one word of each signal
+    // progress of that recording (a scope_state), and its next `count` words, in order from `first`
+    // on: for each sample one word of each signal. There are none before it is complete, unless it
+    // has no end
     BUS_OPERATION_READ_TICKS = 29,
     // values of the waveform of an excitation from this number on, full scale 2^15; nothing is
     // stored behind value 4096 - 1
     BUS_OPERATION_LOAD_EXCITATION = 39,
     // add that waveform, of so many values, to the commands of an axis whose drive is on, one value
-    // at each servo tick; 0 ends it, and so does any request to the axis to move, home, stop or
-    // switch off
+    // at each servo tick, from the trigger of the next recording of ticks to its end. 0 withdraws
+    // it, and so does any request to the axis but that which begins a motion
     BUS_OPERATION_EXCITE = 46,
     // add an offset to the DAC of the fine stage, in open loop, and record the phase from then on,
     // one in so many samples; before the first step both loops open, the command of the motor
@@ -805,30 +821,35 @@ enum bus_operation {
 #define BUS_READ_SCOPE_REPLY_ERROR_4 55u    // i32
 #define BUS_READ_SCOPE_REPLY_COMMAND_4 59u    // i16
 #define BUS_READ_SCOPE_REPLY_TIME_4 61u    // u16
-#define BUS_RECORD_TICKS_REQUEST_LENGTH 8u
+#define BUS_RECORD_TICKS_REQUEST_LENGTH 18u
 #define BUS_RECORD_TICKS_REQUEST_AXIS 2u    // u8
-#define BUS_RECORD_TICKS_REQUEST_SIGNALS 3u    // u8
-#define BUS_RECORD_TICKS_REQUEST_EVERY 4u    // u16
+#define BUS_RECORD_TICKS_REQUEST_SIGNALS 3u    // u16
+#define BUS_RECORD_TICKS_REQUEST_TRIGGER 5u    // u8
 #define BUS_RECORD_TICKS_REQUEST_SAMPLES 6u    // u16
+#define BUS_RECORD_TICKS_REQUEST_EVERY 8u    // u16
+#define BUS_RECORD_TICKS_REQUEST_EARLIER 10u    // u16
+#define BUS_RECORD_TICKS_REQUEST_DELAY 12u    // u16
+#define BUS_RECORD_TICKS_REQUEST_LEVEL 14u    // i32
 #define BUS_RECORD_TICKS_REPLY_LENGTH 3u
 #define BUS_READ_TICKS_REQUEST_LENGTH 2u
-#define BUS_READ_TICKS_REPLY_LENGTH 62u
+#define BUS_READ_TICKS_REPLY_LENGTH 63u
 #define BUS_READ_TICKS_REPLY_STATE 3u    // u8
 #define BUS_READ_TICKS_REPLY_FIRST 4u    // u16
-#define BUS_READ_TICKS_REPLY_WORD_0 6u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_1 10u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_2 14u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_3 18u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_4 22u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_5 26u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_6 30u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_7 34u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_8 38u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_9 42u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_10 46u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_11 50u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_12 54u    // u32
-#define BUS_READ_TICKS_REPLY_WORD_13 58u    // u32
+#define BUS_READ_TICKS_REPLY_COUNT 6u    // u8
+#define BUS_READ_TICKS_REPLY_WORD_0 7u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_1 11u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_2 15u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_3 19u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_4 23u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_5 27u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_6 31u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_7 35u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_8 39u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_9 43u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_10 47u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_11 51u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_12 55u    // u32
+#define BUS_READ_TICKS_REPLY_WORD_13 59u    // u32
 #define BUS_LOAD_EXCITATION_REQUEST_LENGTH 52u
 #define BUS_LOAD_EXCITATION_REQUEST_FIRST 2u    // u16
 #define BUS_LOAD_EXCITATION_REQUEST_VALUE_0 4u    // i16
@@ -1054,8 +1075,8 @@ enum bus_operation {
     X(arm_scope, 31, 13, 3, 1) \
     X(scope, 32, 2, 6, 0) \
     X(read_scope, 33, 3, 63, 0) \
-    X(record_ticks, 28, 8, 3, 1) \
-    X(read_ticks, 29, 2, 62, 0) \
+    X(record_ticks, 28, 18, 3, 1) \
+    X(read_ticks, 29, 2, 63, 0) \
     X(load_excitation, 39, 52, 3, 0) \
     X(excite, 46, 5, 3, 1) \
     X(step_fine, 37, 7, 3, 1) \

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xc94cc514u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x0dfdd864u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -183,13 +183,21 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_SCOPE_AXIS_MASK 0x00000007u
 #define NODE_SCOPE_AXIS_SHIFT 0
 #define NODE_SCOPE_AXIS_WIDTH 3
-// bit n: 0 sine and cosine, 1 target, 2 target velocity, 3 velocity, 4 error, 5 command
-#define NODE_SCOPE_SIGNALS_MASK 0x000001f8u
-#define NODE_SCOPE_SIGNALS_SHIFT 3
-#define NODE_SCOPE_SIGNALS_WIDTH 6
+// bit n: tick_signal n
+#define NODE_SCOPE_SIGNALS_MASK 0x0003ff00u
+#define NODE_SCOPE_SIGNALS_SHIFT 8
+#define NODE_SCOPE_SIGNALS_WIDTH 10
+// tick_signal that triggers
+#define NODE_SCOPE_TRIGGER_MASK 0x0f000000u
+#define NODE_SCOPE_TRIGGER_SHIFT 24
+#define NODE_SCOPE_TRIGGER_WIDTH 4
+// tick_trigger
+#define NODE_SCOPE_MODE_MASK 0x70000000u
+#define NODE_SCOPE_MODE_SHIFT 28
+#define NODE_SCOPE_MODE_WIDTH 3
 // rw: samples of a recording
 #define NODE_SCOPE_SAMPLES 0x034u
-// samples
+// samples; 0: no end, and they are read while it goes on
 #define NODE_SCOPE_SAMPLES_LENGTH_MASK 0x0000ffffu
 #define NODE_SCOPE_SAMPLES_LENGTH_SHIFT 0
 #define NODE_SCOPE_SAMPLES_LENGTH_WIDTH 16
@@ -197,25 +205,22 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_SCOPE_SAMPLES_EVERY_MASK 0xffff0000u
 #define NODE_SCOPE_SAMPLES_EVERY_SHIFT 16
 #define NODE_SCOPE_SAMPLES_EVERY_WIDTH 16
-// rw: state of the recording
-#define NODE_SCOPE_STATE 0x038u
-// begins a recording, at the first value of a waveform that runs
-#define NODE_SCOPE_STATE_START_MASK 0x00000001u
-#define NODE_SCOPE_STATE_START_SHIFT 0
-#define NODE_SCOPE_STATE_START_WIDTH 1
-// it is not complete
-#define NODE_SCOPE_STATE_RECORDING_MASK 0x00000002u
-#define NODE_SCOPE_STATE_RECORDING_SHIFT 1
-#define NODE_SCOPE_STATE_RECORDING_WIDTH 1
-// it is complete
-#define NODE_SCOPE_STATE_FULL_MASK 0x00000004u
-#define NODE_SCOPE_STATE_FULL_SHIFT 2
-#define NODE_SCOPE_STATE_FULL_WIDTH 1
-// r: word of the recording; reading advances to the next one
-#define NODE_SCOPE_WORD 0x03cu
-#define NODE_SCOPE_WORD_MASK 0xffffffffu
-#define NODE_SCOPE_WORD_SHIFT 0
-#define NODE_SCOPE_WORD_WIDTH 32
+// rw: where the trigger is in a recording
+#define NODE_SCOPE_PLACE 0x038u
+// samples from before the trigger, less than length
+#define NODE_SCOPE_PLACE_EARLIER_MASK 0x0000ffffu
+#define NODE_SCOPE_PLACE_EARLIER_SHIFT 0
+#define NODE_SCOPE_PLACE_EARLIER_WIDTH 16
+// from the trigger to the first sample, which also waits for the first value of a waveform; 0: the
+// sample of the trigger [tick]
+#define NODE_SCOPE_PLACE_DELAY_MASK 0xffff0000u
+#define NODE_SCOPE_PLACE_DELAY_SHIFT 16
+#define NODE_SCOPE_PLACE_DELAY_WIDTH 16
+// rw: level of the trigger; writing begins a recording
+#define NODE_SCOPE_LEVEL 0x03cu
+#define NODE_SCOPE_LEVEL_MASK 0xffffffffu
+#define NODE_SCOPE_LEVEL_SHIFT 0
+#define NODE_SCOPE_LEVEL_WIDTH 32
 // rw: tick_count at which the axes are to be at the set-points that are committed next [tick]
 #define NODE_SET_POINT_TICK 0x040u
 #define NODE_SET_POINT_TICK_MASK 0xffffffffu
@@ -262,7 +267,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_STREAM_AXES_MASK 0x000000ffu
 #define NODE_STREAM_AXES_SHIFT 0
 #define NODE_STREAM_AXES_WIDTH 8
-// rw: waveform that is added to the commands of an axis
+// rw: waveform that is added to the commands of an axis from the trigger to the end of a recording
 #define NODE_EXCITATION 0x060u
 // number of the axis
 #define NODE_EXCITATION_AXIS_MASK 0x00000007u
@@ -286,6 +291,21 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_EXCITATION_VALUE_AT_MASK 0x0fff0000u
 #define NODE_EXCITATION_VALUE_AT_SHIFT 16
 #define NODE_EXCITATION_VALUE_AT_WIDTH 12
+// r: state of the recording
+#define NODE_SCOPE_STATE 0x068u
+// scope_state
+#define NODE_SCOPE_STATE_PHASE_MASK 0x00000003u
+#define NODE_SCOPE_STATE_PHASE_SHIFT 0
+#define NODE_SCOPE_STATE_PHASE_WIDTH 2
+// words that can be read
+#define NODE_SCOPE_STATE_AVAILABLE_MASK 0x0007fffcu
+#define NODE_SCOPE_STATE_AVAILABLE_SHIFT 2
+#define NODE_SCOPE_STATE_AVAILABLE_WIDTH 17
+// r: word of the recording; reading advances to the next one
+#define NODE_SCOPE_WORD 0x06cu
+#define NODE_SCOPE_WORD_MASK 0xffffffffu
+#define NODE_SCOPE_WORD_SHIFT 0
+#define NODE_SCOPE_WORD_WIDTH 32
 
 // RS-485 bus: 9-bit UART, address filter, frame check, watchdog
 // rw: duration of one bit [1/16 cycle]
@@ -1117,6 +1137,10 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_BUILT_SET_POINTS_MASK 0x01000000u
 #define AXIS_BUILT_SET_POINTS_SHIFT 24
 #define AXIS_BUILT_SET_POINTS_WIDTH 1
+// HAS_BACKLASH: compensation of backlash
+#define AXIS_BUILT_BACKLASH_MASK 0x02000000u
+#define AXIS_BUILT_BACKLASH_SHIFT 25
+#define AXIS_BUILT_BACKLASH_WIDTH 1
 // rw: largest |integral term|; full scale 2^15
 #define AXIS_INTEGRAL_LIMIT 0x070u
 #define AXIS_INTEGRAL_LIMIT_MASK 0x00007fffu
@@ -1689,6 +1713,27 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_SEGMENT_ERROR_MASK 0x00ffffffu
 #define FEEDBACK_SEGMENT_ERROR_SHIFT 0
 #define FEEDBACK_SEGMENT_ERROR_WIDTH 24
+// rw: backlash between motor and table: how far the motor turns after a reversal until the table
+// moves [1/65536 period]
+#define FEEDBACK_BACKLASH 0x0d8u
+#define FEEDBACK_BACKLASH_MASK 0x00ffffffu
+#define FEEDBACK_BACKLASH_SHIFT 0
+#define FEEDBACK_BACKLASH_WIDTH 24
+// rw: how the backlash is taken up
+#define FEEDBACK_BACKLASH_RATE 0x0dcu
+// velocity of the motor beyond that of the target; 0: at once [1/65536 period/tick]
+#define FEEDBACK_BACKLASH_RATE_MASK 0x00ffffffu
+#define FEEDBACK_BACKLASH_RATE_SHIFT 0
+#define FEEDBACK_BACKLASH_RATE_WIDTH 24
+// how far the target must move back until that is a reversal [1/256 period]
+#define FEEDBACK_BACKLASH_RATE_HYSTERESIS_MASK 0x7f000000u
+#define FEEDBACK_BACKLASH_RATE_HYSTERESIS_SHIFT 24
+#define FEEDBACK_BACKLASH_RATE_HYSTERESIS_WIDTH 7
+// 1: the sensor is on the motor's side, and the position of the axis is that of the table; 0: it is
+// on the table
+#define FEEDBACK_BACKLASH_RATE_MOTOR_SIDE_MASK 0x80000000u
+#define FEEDBACK_BACKLASH_RATE_MOTOR_SIDE_SHIFT 31
+#define FEEDBACK_BACKLASH_RATE_MOTOR_SIDE_WIDTH 1
 
 // actuator: bridge, stepper driver or DAC, and the fine stage
 // rw: kind of drive: 0 bridge, 1 stepper, 2 DAC

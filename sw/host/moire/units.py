@@ -116,13 +116,22 @@ def parse_time(value: Value) -> Fraction:
     return TIME.parse(value)
 
 
-def parse_share(value: Value) -> Fraction:
-    """A fraction of full speed, from "50%" or 0.5; raises UnitError below 0 and above 1."""
+def parse_number(value: Value) -> Fraction:
+    """Without a unit; raises UnitError."""
+    return NUMBER.parse(value)
+
+
+def parse_signed_share(value: Value) -> Fraction:
+    """A fraction, from "-50%" or -0.5; raises UnitError."""
     plain = value.strip() if isinstance(value, str) else value
     if isinstance(plain, str) and plain.endswith("%"):
-        share = NUMBER.parse(plain[:-1]) / 100
-    else:
-        share = NUMBER.parse(plain)
+        return NUMBER.parse(plain[:-1]) / 100
+    return NUMBER.parse(plain)
+
+
+def parse_share(value: Value) -> Fraction:
+    """A fraction of full speed, from "50%" or 0.5; raises UnitError below 0 and above 1."""
+    share = parse_signed_share(value)
     if not 0 <= share <= 1:
         raise UnitError(f"'{value}' is no share of full speed: write 0% to 100%, or 0 to 1")
     return share

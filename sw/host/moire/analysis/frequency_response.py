@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from moire import units
 from moire.analysis.least_squares import least_squares
-from moire.analysis.tick_scope import TickScope
+from moire.analysis.tick_scope import TickScope, Trigger
 from moire.analysis.tune import (
     FULL_SCALE,
     SATURATED,
@@ -42,6 +42,7 @@ from moire.analysis.tune import (
 )
 from moire.client.access import COUNTS
 from moire.client.axis import Axis
+from moire.client.calibration import ends_of_stroke
 
 Array = NDArray[numpy.float64]
 Complex = NDArray[numpy.complex128]
@@ -62,7 +63,9 @@ LEAST_COHERENCE = 0.8
 CLEAR_ERROR = 0.02  # relative standard error of a point that counts half in a fit
 MOST_INCOHERENT = 0.25  # share of the frequencies that may have less
 SIGNALS = ("error", "command")
-STARTING_S = 0.1  # until the axis moves evenly
+AT_SPEED = 0.99  # of the speed: the axis moves evenly
+SPARE = 1.02  # of the stroke
+APPROACH = 0.1  # of the stroke, below it, from where the motions of the slower loop come
 LEAST_SENSITIVITY = 0.1  # share of the excitation that the loop must leave
 SOFT_BANDWIDTH = 6.0  # of the slower loop, in lowest frequencies
 MOST_OF_THE_SPEED = 0.3  # that the excitation of the slower loop may take
@@ -311,18 +314,25 @@ def measure(
     """The response of an axis, which must be enabled, homed and at rest, by some records.
 
     Meanwhile the axis moves to and fro at `speed` (nm/s; None: speed_nm_s(); 0: it stays), so that
-    friction does not change its sign. Frequencies above SPLIT_HZ are measured first. The loop
-    suppresses what is lower than its bandwidth: the frequencies below SPLIT_HZ, and those of which
-    it leaves less than LEAST_SENSITIVITY, are measured with smaller gains.
+    friction does not change its sign, on the side of its position where its travel has room.
+    Frequencies above SPLIT_HZ are measured first. The loop suppresses what is lower than its
+    bandwidth: the frequencies below SPLIT_HZ, and those of which it leaves less than
+    LEAST_SENSITIVITY, are measured with smaller gains.
+    The node times each record: its motion, the excitation and the recording begin there, at ticks,
+    so the measurement does not depend on how fast host and connection are.
     `peak` is the largest value of the multisine, a share of full scale; `progress` gets the number
-    of records done and their number. The axis has its own gains and override again at the end, and
-    does not move. Raises NotTuned, NotRecorded, OutOfRange or Refused.
+    of records done and their number. At the end the axis has its own gains and override again, and
+    stands where it was. Raises NotTuned, NotRecorded, OutOfRange, Refused or MotionFailed.
     """
     tick_s = 1 / axis.node.identity.tick_hz
     high = multisine(tick_s, max(low_hz, SPLIT_HZ), high_hz, peak, PERIOD // 4)
     wished = speed_nm_s(axis) if speed is None else float(speed)
     tuning = in_force(axis)
     check_room(axis, high, wished, records)
+    begin_nm = far_nm = Fraction(axis.status().target_nm)
+    if wished:
+        begin_nm, far_nm = ends_of_stroke(axis, stroke(axis, PERIOD, wished, APPROACH))
+    motion = Motion(wished, begin_nm, far_nm >= begin_nm)
     done = 0
 
     def one_more() -> None:
@@ -331,22 +341,18 @@ def measure(
         progress(done, 2 * records)
 
     def work() -> Response:
-        response = recorded(axis, high, wished, records, one_more)
+        response = recorded(axis, high, motion, records, one_more)
         low = low_band(response, high, low_hz, wished / float(axis.period_nm) * COUNTS)
         if low is None:
             return response
         factor = softness(response, low_hz)
         soft = lambda: softened(axis, tuning, factor)
-        return joined(recorded(axis, low, wished, records, one_more, soft), response, tuning)
+        return joined(recorded(axis, low, motion, records, one_more, soft), response, tuning)
 
-    override = axis.override()
-    try:
-        if wished:
-            velocity = axis.get_parameter("velocity").counts * float(axis.period_nm)  # nm/s
-            axis.override(min(1.0, wished / velocity))
-        return check(axis.stopping_on_error(work))
-    finally:
-        axis.override(override)
+    response = axis.stopping_on_error(work)
+    if wished:
+        axis.move(nm=begin_nm)
+    return check(response)
 
 
 def check_room(axis: Axis, excitation: Excitation, speed_nm_s: float, records: int) -> None:
@@ -374,46 +380,60 @@ def check_room(axis: Axis, excitation: Excitation, speed_nm_s: float, records: i
         )
 
 
+@dataclass(frozen=True)
+class Motion:
+    """How an axis moves while it is measured."""
+
+    speed_nm_s: float  # 0: not at all
+    begin_nm: Fraction  # where it stands at the beginning, and at the end
+    up: bool  # it moves above that place, else below it
+
+    def ends_nm(self, stroke_nm: Fraction | int) -> list[Fraction]:
+        """The lowest and the highest position of a motion of this length."""
+        far_nm = self.begin_nm + (stroke_nm if self.up else -stroke_nm)
+        return sorted([self.begin_nm, far_nm])
+
+
 def recorded(
     axis: Axis,
     excitation: Excitation,
-    speed_nm_s: float,
+    motion: Motion,
     records: int,
     progress: Callable[[], object],
     soft: Callable[[], AbstractContextManager[None]] | None = None,
 ) -> Response:
     """The response by some records, each with a motion of its own.
 
-    All motions lie within a stroke above the position of the axis, a tenth more with `soft`. With
-    `soft`, which makes the gains smaller, all motions go up, and the axis comes to their beginning
-    from below with its own gains: then friction has its sign already, and makes no error.
+    With `soft`, which makes the gains smaller, all motions go up, and the axis comes to their
+    beginning from below with its own gains: then friction has its sign already, and makes no error.
     """
     scope, length = TickScope(axis), len(excitation.values)
-    period_s, every = length * excitation.tick_s, excitation.sparse
-    stroke_nm = speed_nm_s * (SETTLING_PERIODS + PERIODS + 2) * period_s
+    every = excitation.sparse
     scope.load(excitation.values)
-    origin_nm = float(axis.status().position_nm)
-    low_nm = origin_nm if soft is None else origin_nm + 0.1 * stroke_nm
+    speed_nm_s, approach = motion.speed_nm_s, 0.0 if soft is None else APPROACH
+    ends_nm = motion.ends_nm(stroke(axis, length, speed_nm_s, approach) if speed_nm_s else 0)
     errors, commands = [], []
     for number in range(records):
-        ends_nm = [low_nm, low_nm + stroke_nm]
-        if soft is None and number % 2:
-            ends_nm.reverse()
+        trigger = Trigger(delay=SETTLING_PERIODS * length + 1)
+        begin_nm, end_nm = ends_nm if soft is not None or number % 2 == 0 else ends_nm[::-1]
         if speed_nm_s:
+            trigger = at_speed(axis, speed_nm_s, trigger.delay)
+            axis.move(nm=begin_nm)
             if soft is not None:
-                axis.move(nm=origin_nm)
-            axis.move(nm=ends_nm[0])
-        with nullcontext() if soft is None else soft():
+                axis.move(nm=begin_nm + (end_nm - begin_nm) * Fraction(approach / (1 + approach)))
+        with nullcontext() if soft is None else soft(), scope.excited(length):
+            scope.start(
+                SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s), trigger
+            )
             if speed_nm_s:
-                axis.begin_move(nm=ends_nm[1])
-                axis.dwell(STARTING_S)
-            with scope.excited(length):
-                axis.dwell(SETTLING_PERIODS * period_s)
-                scope.start(SIGNALS, PERIODS * length // every, every * Fraction(excitation.tick_s))
-                axis.dwell((PERIODS + 1) * period_s)
-            if speed_nm_s:
-                axis.stop_and_wait()
-        values = scope.read().values
+                with slowed(axis, speed_nm_s):
+                    axis.begin_move(nm=end_nm)
+                    scope.wait()
+                    axis.stop_and_wait()
+            values = scope.read().values
+        status = axis.status()
+        if status.faults:
+            axis.reached(status)
         errors.append(values["error"])
         commands.append(values["command"])
         progress()
@@ -421,6 +441,42 @@ def recorded(
     if float(numpy.mean(numpy.abs(commands) >= limit)) > SATURATED:
         raise NotTuned("the command was at its limit: use a smaller peak, or a slower motion")
     return computed(excitation, errors, commands, float(axis.period_nm), every)
+
+
+def top_speed_nm_s(axis: Axis) -> float:
+    """The speed of a motion at full override."""
+    return axis.get_parameter("velocity").counts * float(axis.period_nm)
+
+
+def stroke(axis: Axis, period: int, speed_nm_s: float, approach: float) -> Fraction:
+    """The length in nm of the motion of a record with this period in ticks, and before it the
+    approach, a share of it.
+
+    It begins and ends as at full override, but slower.
+    """
+    velocity, acceleration, jerk = (
+        axis.get_parameter(name).counts for name in ("velocity", "acceleration", "jerk")
+    )
+    ramps_nm = top_speed_nm_s(axis) * (velocity / acceleration + acceleration / jerk)
+    lasts_s = (SETTLING_PERIODS + PERIODS) * period / axis.node.identity.tick_hz
+    return Fraction(SPARE * (1 + approach) * (speed_nm_s * lasts_s + ramps_nm))
+
+
+@contextmanager
+def slowed(axis: Axis, speed_nm_s: float) -> Iterator[None]:
+    """The axis with an override for this speed, as long as the block lasts."""
+    override = axis.override()
+    axis.override(min(1.0, speed_nm_s / top_speed_nm_s(axis)))
+    try:
+        yield
+    finally:
+        axis.override(override)
+
+
+def at_speed(axis: Axis, speed_nm_s: float, delay: int) -> Trigger:
+    """So many ticks after the target of a motion has reached its speed, up or down."""
+    nm_s = AT_SPEED * min(speed_nm_s, top_speed_nm_s(axis))
+    return Trigger("beyond", "target_velocity", f"{nm_s * 1e-6:.9g}mm/s", delay=delay)
 
 
 # low frequencies, which the loop suppresses

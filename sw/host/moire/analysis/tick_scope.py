@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder of ticks of a node: signals of one axis at each servo tick, evenly spaced, and an
-excitation that is added to the commands of an axis.
+"""The recorder of ticks of a node: signals of one axis at each servo tick, evenly spaced, from
+before a trigger on or without end, and an excitation that is added to the commands of an axis.
 
     scope = TickScope(axis)
-    scope.start(("error", "command"), samples=4096)
+    scope.start(("error", "command"), 4096, trigger=Trigger("beyond", "error", "1um", earlier=400))
     axis.move("1mm")
     record = scope.read()
     Path("move.csv").write_text(record.csv())
+
+    for record in scope.stream(("error", "command"), every="1ms", duration="10s"): ...
 
 Sample n of every signal belongs to the same tick: the position was taken at that tick, and the
 command was computed from it. The node needs SCOPE_WORDS of rtl/node.sv; `moire.analysis.scope` is
@@ -16,7 +18,7 @@ for the others.
 import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy
@@ -28,18 +30,36 @@ from moire.client.access import COUNTS, FULL_SCALE
 from moire.client.axis import Axis
 from moire.client.names import code_name
 from moire.errors import MoireError, OutOfRange
-from moire.made.bus_tables import OPERATIONS, SCOPE_STATES, TICK_SIGNALS, WAVEFORM_LONGEST
+from moire.made.bus_tables import (
+    FAULTS,
+    OPERATIONS,
+    SCOPE_STATES,
+    TICK_SIGNALS,
+    TICK_TRIGGERS,
+    WAVEFORM_LONGEST,
+)
 from moire.made.registers import FIELDS
 
 Array = NDArray[numpy.float64]
 
 SIGNALS = {name: bit for bit, (name, _) in TICK_SIGNALS.items()}
+TRIGGERS = {name: code for code, (name, _) in TICK_TRIGGERS.items()}
+LENGTHS = ("target", "error", "position")  # signals by what they are
+SPEEDS = ("target_velocity", "velocity")
+SHARES = ("command", "fine_command")
 LONGEST_EVERY = 0xFFFF  # ticks from sample to sample
+LONGEST_DELAY = 0xFFFF  # ticks from the trigger to the first sample
+LATE_S = 2.0  # of the node: a recording that lasts so much longer than it should has no servo
+TRIGGER_S = 10.0  # of the node: the longest wait for a trigger
 WORDS_AT_ONCE = sum(field.startswith("word_") for field, _ in OPERATIONS["read_ticks"].reply)
 VALUES_AT_ONCE = sum(
     field.startswith("value_") for field, _ in OPERATIONS["load_excitation"].request
 )
 NODE_FIELDS = {f"{f.register}.{f.field}": f for f in FIELDS if f.block == "node"}
+TIME_STAMP = NODE_FIELDS["time_stamp.value"].address()
+TRIGGER_AT = 4  # bit of a trigger, above the number of its signal
+STREAM_SAMPLES = 256  # of a record of a stream, at most about so many
+STREAM_POLL_S = 0.005  # where no sample has come
 
 
 class NotRecorded(MoireError):
@@ -54,12 +74,13 @@ class TickRecord:
     tick_s: float
     period_nm: float
     values: Mapping[str, Array]  # by name of SIGNALS; sine_cosine is split into sine and cosine
+    first: int = 0  # samples from the trigger to the first one
 
     @property
     def time_s(self) -> Array:
-        """The time of each sample since the first one."""
+        """The time of each sample since the trigger."""
         count = len(next(iter(self.values.values())))
-        return numpy.asarray(numpy.arange(count) * self.every * self.tick_s, float)
+        return numpy.asarray((self.first + numpy.arange(count)) * self.every * self.tick_s, float)
 
     def columns(self) -> dict[str, Array]:
         """The signals in the units that their names state, after the time."""
@@ -73,6 +94,9 @@ class TickRecord:
             "error": ("error_nm", nm),
             "position": ("position_nm", nm),
             "command": ("command_of_full_scale", 1 / FULL_SCALE),
+            "phase": ("phase_periods", 1 / COUNTS),
+            "fine_command": ("fine_command_of_full_scale", 1 / FULL_SCALE),
+            "faults": ("faults_bits", 1.0),
         }
         named = {"time_s": self.time_s}
         for name, values in self.values.items():
@@ -114,6 +138,14 @@ class TickRecord:
         return report.png(figure)
 
 
+def joined(records: Sequence[TickRecord]) -> TickRecord:
+    """Records that follow one another as one."""
+    values = {
+        name: numpy.concatenate([one.values[name] for one in records]) for name in records[0].values
+    }
+    return replace(records[0], values=values)
+
+
 def signed(words: ArrayLike, bits: int) -> Array:
     """Unsigned words as numbers in two's complement."""
     whole = numpy.asarray(words, numpy.int64)
@@ -130,13 +162,52 @@ def unwrapped(low_words: ArrayLike, near: int) -> Array:
 
 
 @dataclass(frozen=True)
+class Trigger:
+    """When a recording begins."""
+
+    kind: str = "now"  # of TRIGGERS
+    signal: str = "error"  # of SIGNALS
+    level: units.Value | None = None  # with a unit that fits the signal; None: 0, or any fault
+    earlier: int = 0  # samples from before the trigger, where there is no delay
+    delay: int = 0  # ticks from the trigger to the first sample
+
+    def counts(self, period_nm: Fraction, tick_hz: int) -> int:
+        """The level in LSB of the signal; raises UnitError or OutOfRange."""
+        if self.kind not in TRIGGERS:
+            raise OutOfRange(f"there is no trigger '{self.kind}': there are {', '.join(TRIGGERS)}")
+        if self.signal not in SIGNALS:
+            raise OutOfRange(
+                f"there is no signal '{self.signal}' to trigger: there are {', '.join(SIGNALS)}"
+            )
+        lsb_nm = period_nm / COUNTS
+        if self.level is None:
+            level = Fraction((1 << len(FAULTS)) - 1 if self.kind == "bits" else 0)
+        elif self.signal in LENGTHS:
+            level = units.parse_length(self.level) / lsb_nm
+        elif self.signal in SPEEDS:
+            level = units.parse_speed(self.level) * 1_000_000 / lsb_nm / tick_hz
+        elif self.signal in SHARES:
+            level = units.parse_signed_share(self.level) * FULL_SCALE
+        else:
+            level = units.parse_number(self.level)
+        if abs(level) >= 1 << 31:
+            raise OutOfRange(f"the level of the trigger is too large for '{self.signal}'")
+        return round(level)
+
+
+NOW = Trigger()
+
+
+@dataclass(frozen=True)
 class Setting:
     """What a recording has."""
 
     axis: int
     signals: tuple[str, ...]  # of SIGNALS, in their order
-    samples: int
+    samples: int  # 0: no end
     every: int  # ticks from sample to sample
+    earlier: int = 0  # samples from before the trigger
+    delay: int = 0  # ticks from the trigger to the first sample
 
     @property
     def words(self) -> int:
@@ -149,6 +220,8 @@ class TickScope:
 
     def __init__(self, axis: Axis):
         self.axis, self.node = axis, axis.node
+        self.tick_hz = axis.node.identity.tick_hz
+        self.tick_s = 1 / self.tick_hz
 
     @property
     def nothing(self) -> str:
@@ -168,6 +241,8 @@ class TickScope:
             tuple(name for name, bit in SIGNALS.items() if chosen >> bit & 1),
             self.field("scope_samples.length"),
             max(1, self.field("scope_samples.every")),
+            self.field("scope_place.earlier"),
+            self.field("scope_place.delay"),
         )
 
     def words(self) -> int:
@@ -185,94 +260,198 @@ class TickScope:
         return words // len(signals)
 
     def start(
-        self, signals: Sequence[str], samples: int | None = None, every: units.Value | None = None
+        self,
+        signals: Sequence[str],
+        samples: int | None = None,
+        every: units.Value | None = None,
+        trigger: Trigger = NOW,
     ) -> None:
-        """Begins a recording of these SIGNALS; raises OutOfRange or NotRecorded.
+        """Begins a recording of these SIGNALS at a trigger; raises OutOfRange or NotRecorded.
 
         `samples` is None for as many as fit. `every` (s, or a text) is rounded to servo ticks, and
         None is each tick.
         """
-        if unknown := [name for name in signals if name not in SIGNALS]:
-            raise OutOfRange(
-                f"there is no signal '{unknown[0]}' to record: there are {', '.join(SIGNALS)}"
-            )
-        chosen = tuple(name for name in SIGNALS if name in signals)
-        if not chosen:
-            raise OutOfRange(f"name a signal to record: {', '.join(SIGNALS)}")
-        tick_hz = self.node.identity.tick_hz
-        ticks = 1 if every is None else round(units.parse_time(every) * tick_hz)
-        if not 1 <= ticks <= LONGEST_EVERY:
-            raise OutOfRange(
-                f"samples come every {units.format_time(Fraction(1, tick_hz))} to "
-                f"{units.format_time(Fraction(LONGEST_EVERY, tick_hz))}"
-            )
+        chosen, ticks = self.chosen(signals), self.ticks(every)
         most = self.longest(chosen)
         count = most if samples is None else samples
         if not 1 <= count <= most:
             raise OutOfRange(
                 f"{count} samples of {len(chosen)} signals do not fit: from 1 to {most}"
             )
+        if not 0 <= trigger.earlier < count or not 0 <= trigger.delay <= LONGEST_DELAY:
+            raise OutOfRange(
+                f"{trigger.earlier} samples before the trigger, or {trigger.delay} ticks after "
+                f"it: from 0 to {count - 1}, or to {LONGEST_DELAY}"
+            )
+        self.request(chosen, ticks, count, trigger)
+
+    def chosen(self, signals: Sequence[str]) -> tuple[str, ...]:
+        """These signals in the order of their words; raises OutOfRange."""
+        if unknown := [name for name in signals if name not in SIGNALS]:
+            raise OutOfRange(
+                f"there is no signal '{unknown[0]}' to record: there are {', '.join(SIGNALS)}"
+            )
+        if not signals:
+            raise OutOfRange(f"name a signal to record: {', '.join(SIGNALS)}")
+        return tuple(name for name in SIGNALS if name in signals)
+
+    def ticks(self, every: units.Value | None) -> int:
+        """Servo ticks from sample to sample; raises OutOfRange."""
+        ticks = 1 if every is None else round(units.parse_time(every) * self.tick_hz)
+        if not 1 <= ticks <= LONGEST_EVERY:
+            raise OutOfRange(
+                f"samples come every {units.format_time(Fraction(1, self.tick_hz))} to "
+                f"{units.format_time(Fraction(LONGEST_EVERY, self.tick_hz))}"
+            )
+        return ticks
+
+    def request(self, chosen: Sequence[str], ticks: int, samples: int, trigger: Trigger) -> None:
+        """Sends the request to record."""
+        level = trigger.counts(self.axis.period_nm, self.tick_hz)
         self.axis.request(
             "record_ticks",
             signals=sum(1 << SIGNALS[name] for name in chosen),
+            trigger=SIGNALS[trigger.signal] | TRIGGERS[trigger.kind] << TRIGGER_AT,
             every=ticks,
-            samples=count,
+            samples=samples,
+            earlier=trigger.earlier,
+            delay=trigger.delay,
+            level=level,
         )
 
-    def state(self) -> str:
-        """Whether it is "recording", "full" or "empty"; of a full one it passes words."""
-        return code_name(SCOPE_STATES, self.node.request("read_ticks")["state"], "state")
-
-    def read(self, progress: Callable[[int], object] = lambda done: None) -> TickRecord:
-        """The recording, as soon as it is complete; raises NotRecorded.
-
-        `progress` gets the number of words read so far. It sends requests often enough for the
-        watchdog.
+    def progress(self) -> tuple[str, int]:
+        """Whether it is "empty", "waiting" for its trigger, "recording" or "full", and the number
+        of words that can be read. It reads none of them.
         """
-        transport, setting = self.axis.transport, self.setting()
+        name = code_name(SCOPE_STATES, self.field("scope_state.phase"), "state")
+        return name, self.field("scope_state.available")
+
+    def state(self) -> str:
+        """Whether it is "empty", "waiting" for its trigger, "recording" or "full"."""
+        return self.progress()[0]
+
+    def now_s(self) -> float:
+        """The time of the node since its reset, however fast it runs."""
+        low, high = (self.node.read_register(TIME_STAMP + at) for at in (0, 4))
+        return (high << 32 | low) / self.node.identity.clk_hz
+
+    def wait(self, timeout: units.Value = TRIGGER_S) -> Setting:
+        """Returns the setting of the recording when it is complete; raises NotRecorded.
+
+        `timeout` is how long it waits for the trigger, in the time of the node. It sends requests
+        often enough for the watchdog.
+        """
+        setting = self.setting()
         if setting.axis != self.axis.number:
             raise NotRecorded(
                 f"the recording of node {self.node.address} is of axis {setting.axis}, not of axis "
                 f"{self.axis.number}"
             )
-        if setting.words == 0:
-            raise NotRecorded(self.nothing)
-        tick_s = 1 / self.node.identity.tick_hz
-        end = transport.now() + setting.samples * setting.every * tick_s * 2 + 2.0
-        total = setting.words
-        words: list[int] = []
-        while len(words) < total:
-            reply = self.node.request("read_ticks")
-            state = code_name(SCOPE_STATES, reply["state"], "state")
+        ticks = setting.samples * setting.every + setting.delay
+        begun, lasts_s = self.now_s(), ticks / self.tick_hz
+        waited_s = float(units.parse_time(timeout))
+        while (state := self.state()) != "full":
             if state == "empty":
                 raise NotRecorded(self.nothing)
-            if state == "full":
-                if reply["first"] != len(words) % (1 << 16):
-                    raise NotRecorded(
-                        "another client has read the recording at the same time: record again"
-                    )
-                words += [reply[f"word_{n}"] for n in range(WORDS_AT_ONCE)]
-                progress(min(len(words), total))
-                continue
-            if transport.now() > end:
+            elapsed = self.now_s() - begun
+            if state == "waiting" and elapsed > waited_s + setting.delay * self.tick_s:
+                raise NotRecorded(
+                    f"the recording of node {self.node.address} was not triggered within "
+                    f"{units.format_time(units.parse_time(timeout))}"
+                )
+            if elapsed > waited_s + lasts_s + LATE_S:
                 raise NotRecorded(
                     f"the recording of node {self.node.address} did not come to its end: does its "
                     "servo run?"
                 )
             self.node.bus.until_next_poll(self.node)
-        rows = numpy.array(words[:total], numpy.int64).reshape(setting.samples, -1).T
+        return setting
+
+    def read(
+        self,
+        progress: Callable[[int], object] = lambda done: None,
+        timeout: units.Value = TRIGGER_S,
+    ) -> TickRecord:
+        """The recording, as soon as it is complete; raises NotRecorded.
+
+        `progress` gets the number of words read so far; `timeout` is that of wait().
+        """
+        setting = self.wait(timeout)
+        words: list[int] = []
+        while len(words) < setting.words:
+            words += self.some_words(len(words))
+            progress(len(words))
+        first = -setting.earlier + round(setting.delay / setting.every)
+        return self.record_of(setting, words, first)
+
+    def some_words(self, first: int) -> list[int]:
+        """The next words of the recording, of which so many have been read; raises NotRecorded."""
+        reply = self.node.request("read_ticks")
+        if reply["first"] != first % (1 << 16):
+            raise NotRecorded(
+                "another client has read the recording at the same time: record again"
+            )
+        return [reply[f"word_{n}"] for n in range(reply["count"])]
+
+    def record_of(self, setting: Setting, words: Sequence[int], first: int) -> TickRecord:
+        """The signals of whole samples of words."""
+        rows = numpy.array(words, numpy.int64).reshape(-1, len(setting.signals)).T
         values: dict[str, Array] = {}
         for name, row in zip(setting.signals, rows, strict=True):
             if name == "sine_cosine":
                 values["sine"], values["cosine"] = signed(row & 0xFFFF, 16), signed(row >> 16, 16)
-            elif name == "target":
+            elif name in ("target", "position"):
                 near = self.node.request("position", axis=self.axis.number)["position"]
                 values[name] = unwrapped(row, near)
+            elif name in ("phase", "faults"):
+                values[name] = numpy.asarray(row, float)
             else:
                 values[name] = signed(row, 16 if name == "command" else 32)
-        if "target" in values and "error" in values:
+        if "target" in values and "error" in values and "position" not in values:
             values["position"] = values["target"] - values["error"]
-        return TickRecord(setting.every, tick_s, float(self.axis.period_nm), values)
+        return TickRecord(setting.every, self.tick_s, float(self.axis.period_nm), values, first)
+
+    def stream(
+        self,
+        signals: Sequence[str],
+        every: units.Value | None = None,
+        duration: units.Value | None = None,
+    ) -> Iterator[TickRecord]:
+        """The signals without a gap, in records that follow one another: for a duration, or as long
+        as anybody takes them.
+
+        Raises OutOfRange, and NotRecorded once the memory of the node is full because the samples
+        are not taken as fast as they come.
+        """
+        chosen, ticks = self.chosen(signals), self.ticks(every)
+        self.longest(chosen)  # there is a recorder
+        left = (
+            None if duration is None else round(units.parse_time(duration) / ticks * self.tick_hz)
+        )
+        setting = Setting(self.axis.number, chosen, 0, ticks)
+        self.request(chosen, ticks, 0, NOW)
+        words: list[int] = []
+        passed = given = 0
+        while left is None or given < left:
+            some = self.some_words(passed)
+            passed += len(some)
+            words += some
+            whole = len(words) // len(chosen)
+            if left is not None:
+                whole = min(whole, left - given)
+            if whole and (len(some) < WORDS_AT_ONCE or whole >= STREAM_SAMPLES):
+                yield self.record_of(setting, words[: whole * len(chosen)], given)
+                del words[: whole * len(chosen)]
+                given += whole
+            if not some:
+                state, available = self.progress()
+                if state in ("full", "empty") and not available:
+                    raise NotRecorded(
+                        f"the stream of node {self.node.address} has ended: its memory was full, "
+                        "since the samples come faster than they are read; stream fewer signals, "
+                        "or one sample in more ticks"
+                    )
+                self.node.bus.until_next_poll(self.node, STREAM_POLL_S)
 
     # the excitation
 
@@ -294,9 +473,11 @@ class TickScope:
 
     @contextmanager
     def excited(self, period: int) -> Iterator[None]:
-        """Adds the loaded waveform to the commands of the axis as long as the block lasts.
+        """Adds the loaded waveform to the commands of the axis from the trigger to the end of the
+        recordings that begin within the block; their delay ends with its first value.
 
-        The drive must be on; a request to the axis to move or stop ends the excitation, too.
+        The drive must be on. A motion may begin meanwhile, any other request to the axis ends the
+        excitation.
         """
         self.axis.request("excite", period=period)
         try:

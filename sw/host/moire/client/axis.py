@@ -50,6 +50,8 @@ from moire.made.bus_tables import (
 if TYPE_CHECKING:
     from moire.client.node import Node
 
+MOST_BACKLASH = (1 << 24) - 1  # counts
+HYSTERESIS = COUNTS >> 8  # counts, of its reversals
 HARMONICS = 10  # orders of phase error that are corrected
 REACT_S = 0.3  # that a program needs to notice that its motion was stopped, and to end
 SCATTER = 1 << 20  # counts of the calibration's scatter in one signal period
@@ -131,6 +133,43 @@ class Axis(AxisParameters, AxisCapture):
     def reset(self) -> None:
         """Clears latched faults whose cause is gone. The drive stays off."""
         self.request("reset_faults")
+
+    def set_backlash(
+        self,
+        backlash: units.Value,
+        velocity: units.Value,
+        hysteresis: units.Value,
+        motor_side: bool = False,
+    ) -> None:
+        """Sets how far the motor moves after a reversal until the table moves (nm, or a text), and
+        the velocity beyond that of the target (mm/s, or a text) with which it does so.
+
+        hysteresis: how far the target must come back until that is a reversal (nm, or a text).
+        motor_side: the sensor is on the motor's side of the backlash. It is valid until the node
+        has no power. Raises OutOfRange, or Refused `not_built` without HAS_BACKLASH.
+        """
+        counts = self.to_counts(backlash)
+        ticks = self.node.identity.tick_hz
+        rate = round(units.parse_speed(velocity) * 1_000_000 / self.period_nm * COUNTS / ticks)
+        back = self.to_counts(hysteresis) // HYSTERESIS
+        if not 0 <= counts <= MOST_BACKLASH or not 0 < rate <= MOST_BACKLASH or not 0 <= back < 128:
+            most, half = (
+                units.format_length(most * self.period_nm / COUNTS)
+                for most in (MOST_BACKLASH, 127 * HYSTERESIS)
+            )
+            raise OutOfRange(
+                f"backlash {backlash} with {velocity} and hysteresis {hysteresis}: the backlash "
+                f"must be 0 to {most}, the velocity above 0 and at most that in each servo tick, "
+                f"the hysteresis 0 to {half}"
+            )
+        self.node.write_named("feedback.backlash", self.number, value=counts)
+        self.node.write_named(
+            "feedback.backlash_rate",
+            self.number,
+            value=rate,
+            hysteresis=back,
+            motor_side=int(motor_side),
+        )
 
     def drive(self) -> Drive:
         """Which output the drive command goes to, and its present value."""

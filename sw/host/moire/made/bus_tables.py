@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xD40D10C0
+PROTOCOL_CRC = 0xFF461A1E
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -251,6 +251,19 @@ TICK_SIGNALS = {
     3: ("velocity", "measured velocity, 2^-16 period per tick"),
     4: ("error", "target - position, 2^-16 period"),
     5: ("command", "command to the drive, full scale 2^15"),
+    6: ("position", "position, low word, 2^-16 period"),
+    7: ("phase", "interpolated phase, 2^-16 period"),
+    8: ("fine_command", "command to the fine stage, full scale 2^15"),
+    9: ("faults", "latched faults, bits of a fault"),
+}
+
+# code: (name, words)
+TICK_TRIGGERS = {
+    0: ("now", "at once"),
+    1: ("rises", "it rises to the level"),
+    2: ("falls", "it falls below the level"),
+    3: ("beyond", "its size reaches the level"),
+    4: ("bits", "it has a bit of the level"),
 }
 
 # code: (name, words)
@@ -426,7 +439,7 @@ OPERATIONS = {operation.name: operation for operation in (
               (("faults", "u16"), ("first", "u16"),)),
     Operation("write_register", 19,
               "one word of the register map: only index, capture and compare of the feedback "
-              "channels, and in the image `stream` the set-points and requests of a host",
+              "channels, and in images that play streams the set-points and requests of a host",
               (("address", "u16"), ("value", "u32"),),
               ()),
     Operation("prepare", 20, "plan a motion to a position, and wait for start",
@@ -495,22 +508,26 @@ OPERATIONS = {operation.name: operation for operation in (
                ("time_3", "u16"), ("position_4", "i32"), ("error_4", "i32"),
                ("command_4", "i16"), ("time_4", "u16"),)),
     Operation("record_ticks", 28,
-              "record signals of an axis at each servo tick, or one tick in so many: bits of a "
-              "tick_signal, so many samples; while an excitation runs, the recording begins with "
-              "its first value",
-              (("axis", "u8"), ("signals", "u8"), ("every", "u16"),
-               ("samples", "u16"),),
+              "record signals of an axis (bits of a tick_signal) at each servo tick, or one tick "
+              "in so many. The trigger is a tick_signal (bits 0 to 3) and a tick_trigger (bits 4 "
+              "to 6); so many samples are from before it, or the first one comes so many ticks "
+              "after it, with the first value of an excitation. With 0 samples the recording has "
+              "no end and is read while it goes on. What does not fit into the memory ends it",
+              (("axis", "u8"), ("signals", "u16"), ("trigger", "u8"),
+               ("samples", "u16"), ("every", "u16"), ("earlier", "u16"),
+               ("delay", "u16"), ("level", "i32"),),
               ()),
     Operation("read_ticks", 29,
-              "progress of that recording (a scope_state); once it is complete, its next words, "
-              "in order from `first` on: for each sample one word of each signal",
+              "progress of that recording (a scope_state), and its next `count` words, in order "
+              "from `first` on: for each sample one word of each signal. There are none before it "
+              "is complete, unless it has no end",
               (),
-              (("state", "u8"), ("first", "u16"), ("word_0", "u32"),
-               ("word_1", "u32"), ("word_2", "u32"), ("word_3", "u32"),
-               ("word_4", "u32"), ("word_5", "u32"), ("word_6", "u32"),
-               ("word_7", "u32"), ("word_8", "u32"), ("word_9", "u32"),
-               ("word_10", "u32"), ("word_11", "u32"), ("word_12", "u32"),
-               ("word_13", "u32"),)),
+              (("state", "u8"), ("first", "u16"), ("count", "u8"),
+               ("word_0", "u32"), ("word_1", "u32"), ("word_2", "u32"),
+               ("word_3", "u32"), ("word_4", "u32"), ("word_5", "u32"),
+               ("word_6", "u32"), ("word_7", "u32"), ("word_8", "u32"),
+               ("word_9", "u32"), ("word_10", "u32"), ("word_11", "u32"),
+               ("word_12", "u32"), ("word_13", "u32"),)),
     Operation("load_excitation", 39,
               "values of the waveform of an excitation from this number on, full scale 2^15; "
               "nothing is stored behind value 4096 - 1",
@@ -526,8 +543,9 @@ OPERATIONS = {operation.name: operation for operation in (
               ()),
     Operation("excite", 46,
               "add that waveform, of so many values, to the commands of an axis whose drive is "
-              "on, one value at each servo tick; 0 ends it, and so does any request to the axis "
-              "to move, home, stop or switch off",
+              "on, one value at each servo tick, from the trigger of the next recording of ticks "
+              "to its end. 0 withdraws it, and so does any request to the axis but that which "
+              "begins a motion",
               (("axis", "u8"), ("period", "u16"),),
               ()),
     Operation("step_fine", 37,

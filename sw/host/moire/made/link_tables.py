@@ -19,13 +19,15 @@ REPLY_WORDS = 5
 REPLY_END_SPARE_VALUE = 0
 REPLY_END_WORDS = 1
 FRAME_WORDS = 6
+REPLY_FRAME_WORDS = 7
 LONGEST_WORDS = 128
 MOST_VALUES = 121
+UDP_PORT = 27181
 
 # why a packet is refused, in the order of its count: (name, words)
 CAUSES = (
     ("damaged", "the CRC-32 is wrong, or the carrier has lost a byte"),
-    ("foreign", "another kind or session, or the link is off"),
+    ("foreign", "another kind or session, another host while a drive is on, or the link is off"),
     ("wrong_length", "another length than the lists have"),
     ("replayed", "the sequence is not later than the last one"),
     ("out_of_time", "its time differs from the time of the node by more than the window"),

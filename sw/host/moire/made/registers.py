@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xC94CC514  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x0DFDD864  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -130,16 +130,27 @@ FIELDS = (
     ),
     Field(
         "node", "scope", "signals",
-        0x30, 3, 6, False, "rw", "",
+        0x30, 8, 10, False, "rw", "",
         Fraction(1, 1),
-        "bit n: 0 sine and cosine, 1 target, 2 target velocity, 3 velocity, 4 error, 5 "
-        "command",
+        "bit n: tick_signal n",
+    ),
+    Field(
+        "node", "scope", "trigger",
+        0x30, 24, 4, False, "rw", "",
+        Fraction(1, 1),
+        "tick_signal that triggers",
+    ),
+    Field(
+        "node", "scope", "mode",
+        0x30, 28, 3, False, "rw", "",
+        Fraction(1, 1),
+        "tick_trigger",
     ),
     Field(
         "node", "scope_samples", "length",
         0x34, 0, 16, False, "rw", "",
         Fraction(1, 1),
-        "samples",
+        "samples; 0: no end, and they are read while it goes on",
     ),
     Field(
         "node", "scope_samples", "every",
@@ -148,28 +159,23 @@ FIELDS = (
         "from sample to sample; 0 acts as 1",
     ),
     Field(
-        "node", "scope_state", "start",
-        0x38, 0, 1, False, "w", "",
+        "node", "scope_place", "earlier",
+        0x38, 0, 16, False, "rw", "",
         Fraction(1, 1),
-        "begins a recording, at the first value of a waveform that runs",
+        "samples from before the trigger, less than length",
     ),
     Field(
-        "node", "scope_state", "recording",
-        0x38, 1, 1, False, "r", "",
+        "node", "scope_place", "delay",
+        0x38, 16, 16, False, "rw", "tick",
         Fraction(1, 1),
-        "it is not complete",
+        "from the trigger to the first sample, which also waits for the first value of a "
+        "waveform; 0: the sample of the trigger",
     ),
     Field(
-        "node", "scope_state", "full",
-        0x38, 2, 1, False, "r", "",
+        "node", "scope_level", "value",
+        0x3C, 0, 32, True, "rw", "",
         Fraction(1, 1),
-        "it is complete",
-    ),
-    Field(
-        "node", "scope_word", "value",
-        0x3C, 0, 32, False, "r", "",
-        Fraction(1, 1),
-        "word of the recording; reading advances to the next one",
+        "level of the trigger; writing begins a recording",
     ),
     Field(
         "node", "set_point_tick", "value",
@@ -256,6 +262,24 @@ FIELDS = (
         0x64, 16, 12, False, "w", "",
         Fraction(1, 1),
         "its number",
+    ),
+    Field(
+        "node", "scope_state", "phase",
+        0x68, 0, 2, False, "r", "",
+        Fraction(1, 1),
+        "scope_state",
+    ),
+    Field(
+        "node", "scope_state", "available",
+        0x68, 2, 17, False, "r", "",
+        Fraction(1, 1),
+        "words that can be read",
+    ),
+    Field(
+        "node", "scope_word", "value",
+        0x6C, 0, 32, False, "r", "",
+        Fraction(1, 1),
+        "word of the recording; reading advances to the next one",
     ),
     Field(
         "bus", "bit_time", "value",
@@ -1381,6 +1405,12 @@ FIELDS = (
         "HAS_SET_POINTS: player of streamed set-points",
     ),
     Field(
+        "axis", "built", "backlash",
+        0x6C, 25, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_BACKLASH: compensation of backlash",
+    ),
+    Field(
         "axis", "integral_limit", "value",
         0x70, 0, 15, False, "rw", "",
         Fraction(1, 1),
@@ -2113,6 +2143,32 @@ FIELDS = (
         0xD4, 0, 24, True, "r", "period",
         Fraction(1, 65536),
         "error subtracted from the position now",
+    ),
+    Field(
+        "feedback", "backlash", "value",
+        0xD8, 0, 24, False, "rw", "period",
+        Fraction(1, 65536),
+        "backlash between motor and table: how far the motor turns after a reversal until the "
+        "table moves",
+    ),
+    Field(
+        "feedback", "backlash_rate", "value",
+        0xDC, 0, 24, False, "rw", "period/tick",
+        Fraction(1, 65536),
+        "velocity of the motor beyond that of the target; 0: at once",
+    ),
+    Field(
+        "feedback", "backlash_rate", "hysteresis",
+        0xDC, 24, 7, False, "rw", "period",
+        Fraction(1, 256),
+        "how far the target must move back until that is a reversal",
+    ),
+    Field(
+        "feedback", "backlash_rate", "motor_side",
+        0xDC, 31, 1, False, "rw", "",
+        Fraction(1, 1),
+        "1: the sensor is on the motor's side, and the position of the axis is that of the "
+        "table; 0: it is on the table",
     ),
     Field(
         "actuator", "drive", "value",

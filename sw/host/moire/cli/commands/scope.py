@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands about the recorders in a node: scope arm, read, show; scope record, save."""
+"""The commands about the recorders in a node: scope arm, read, show; record, save, stream."""
+
+from __future__ import annotations
 
 from dataclasses import asdict
 from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,9 +15,13 @@ from moire.analysis.scope import SAMPLES, TRIGGERS, Scope
 from moire.cli.files import write_bytes
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
-from moire.cli.values import DURATION, FILE, LENGTH, POSITIVE, TIME, WHOLE, Name
-from moire.made.bus_tables import SCOPE_STATES, TICK_SIGNALS
+from moire.cli.values import DURATION, FILE, LENGTH, POSITIVE, TEXT, TIME, WHOLE, Name
+from moire.made.bus_tables import SCOPE_STATES, TICK_SIGNALS, TICK_TRIGGERS
 
+if TYPE_CHECKING:
+    from moire.analysis.tick_scope import TickRecord
+
+TIMEOUT = partial(click.option, "--timeout", type=TIME, default="10s", metavar="TIME")
 EXAMPLE = (
     "moire --port twin home -- scope arm --trigger motion -- move 100um -- scope read move.csv"
 )
@@ -21,8 +29,9 @@ EXAMPLE = (
 group = Group(
     "scope",
     help="Record signals of an axis. `arm` and `read` are for every node: 128 samples of position, "
-    "error and command around a trigger. `record` and `save` need SCOPE_WORDS of rtl/node.sv: they "
-    "record chosen signals at each servo tick, evenly, thousands of samples.",
+    "error and command around a trigger. `record`, `save` and `stream` need SCOPE_WORDS of "
+    "rtl/node.sv: they record chosen signals at each servo tick, evenly, thousands of samples or "
+    "without end.",
     example=EXAMPLE,
 )
 moire.add_command(group)
@@ -85,11 +94,7 @@ def arm(call: Call, trigger: str, before: int, every: Fraction, level: Fraction)
     metavar="PNG",
     help="Draw position, error and drive command over time.",
 )
-@click.option(
-    "--timeout",
-    type=TIME,
-    default="10s",
-    metavar="TIME",
+@TIMEOUT(
     help="The command gives up after this time. The default is 10s.",
 )
 def read(call: Call, file: str, picture: str | None, timeout: Fraction) -> None:
@@ -118,46 +123,111 @@ def show(call: Call) -> None:
     call.say_of_axis({"state": state}, f"node {call.options.address}: {words}")
 
 
-SIGNALS = ",".join(name for name, _ in TICK_SIGNALS.values())
+SIGNALS = [name for name, _ in TICK_SIGNALS.values()]
+KINDS = [name for name, _ in TICK_TRIGGERS.values()]
+SIGNAL = Name("signal", SIGNALS)
+WHAT = click.option(
+    "--signals",
+    default="target,error,command",
+    metavar=",".join(SIGNALS),
+    help="What is recorded, with commas between. target and error together also give the position. "
+    "The default is target,error,command.",
+)
+EVERY = click.option(
+    "--every",
+    type=DURATION,
+    metavar="TIME",
+    help="The time from sample to sample. The default is the servo tick.",
+)
+PICTURE = click.option("--picture", type=FILE, metavar="PNG", help="Draw the signals over time.")
+COLUMNS = (
+    "The names of the columns end in their units. A name that ends in .parquet gives Parquet, any "
+    "other one CSV."
+)
+
+
+def names(signals: str) -> list[str]:
+    """The names in a text with commas between."""
+    return [name.strip() for name in signals.split(",") if name.strip()]
+
+
+def write(call: Call, file: str, made: TickRecord, picture: str | None, more: str = "") -> None:
+    """Writes a recording, and says so."""
+    write_bytes(file, made.parquet() if file.endswith(".parquet") else made.csv().encode())
+    if picture:
+        write_bytes(picture, made.picture())
+    call.say_of_axis(
+        {"file": file, **{name: list(values) for name, values in made.columns().items()}},
+        f"{len(made.time_s)} samples of {', '.join(made.values)} in {file}{more}",
+    )
 
 
 @group.command(
     "record",
-    help="Record signals of an axis at each servo tick from now on, or at one in some; return at "
-    "once.",
-    example="moire --port twin home -- scope record -- move 100um -- scope save move.csv",
+    help="Record signals of an axis at each servo tick, or at one in some, from now on or from a "
+    "trigger on; return at once.",
+    example="moire --port twin home -- scope record --trigger beyond --of error --level 50nm "
+    "--before 1000 -- move 100um -- scope save move.csv",
 )
-@click.option(
-    "--signals",
-    default="target,error,command",
-    metavar=SIGNALS,
-    help="What is recorded, with commas between. target and error together also give the position. "
-    "The default is target,error,command.",
-)
+@WHAT
 @click.option(
     "--samples",
     type=POSITIVE,
     metavar="N",
     help="The number of samples. The default is as many as fit.",
 )
+@EVERY
 @click.option(
-    "--every",
-    type=DURATION,
-    metavar="TIME",
-    help="The time from sample to sample. The default is the servo tick.",
+    "--trigger",
+    type=Name("trigger", KINDS),
+    default="now",
+    metavar=",".join(KINDS),
+    help="What starts the recording: the signal of --of rises to the level, falls below it, is "
+    "beyond it in either direction, or has one of its bits. The default is now.",
 )
-def record(call: Call, signals: str, samples: int | None, every: Fraction | None) -> None:
+@click.option(
+    "--of",
+    type=SIGNAL,
+    default="error",
+    metavar="SIGNAL",
+    help="The signal of the trigger. It need not be recorded. The default is error.",
+)
+@click.option(
+    "--level",
+    type=TEXT,
+    metavar="VALUE",
+    help="The level of the trigger with a unit of its signal: a length, a speed, a share of full "
+    "scale such as 20%, or a number. The default is 0, and for bits any bit.",
+)
+@click.option(
+    "--before",
+    type=WHOLE,
+    default=0,
+    metavar="N",
+    help="The number of samples from before the trigger. The default is 0.",
+)
+def record(
+    call: Call,
+    signals: str,
+    samples: int | None,
+    every: Fraction | None,
+    trigger: str,
+    of: str,
+    level: str | None,
+    before: int,
+) -> None:
     """The recording goes on in the node."""
-    from moire.analysis.tick_scope import TickScope  # NumPy only where it is needed
+    from moire.analysis.tick_scope import TickScope, Trigger  # NumPy only where it is needed
 
     scope = TickScope(call.axis)
-    scope.start([name.strip() for name in signals.split(",") if name.strip()], samples, every)
+    scope.start(names(signals), samples, every, Trigger(trigger, of, level, before))
     setting = scope.setting()
     seconds = Fraction(setting.samples * setting.every, call.node.identity.tick_hz)
     call.say_of_axis(
         {"signals": setting.signals, "samples": setting.samples, "every_ticks": setting.every},
         f"{call.where}: {setting.samples} samples of {', '.join(setting.signals)} in "
-        f"{units.format_time(seconds)}",
+        f"{units.format_time(seconds)}"
+        + ("" if trigger == "now" else f", {before} of them before the trigger"),
     )
 
 
@@ -166,23 +236,48 @@ def record(call: Call, signals: str, samples: int | None, every: Fraction | None
     help="Wait until that recording is complete, then write it.",
     example="moire scope save move.csv --picture move.png",
 )
-@click.argument(
-    "file",
-    type=FILE,
-    metavar="FILE",
-    help="The names of the columns end in their units. A name that ends in .parquet gives Parquet, "
-    "any other one CSV.",
+@click.argument("file", type=FILE, metavar="FILE", help=f"Time 0 is the trigger. {COLUMNS}")
+@PICTURE
+@TIMEOUT(
+    help="The longest wait for the trigger, in the time of the node. The default is 10s.",
 )
-@click.option("--picture", type=FILE, metavar="PNG", help="Draw the signals over time.")
-def save(call: Call, file: str, picture: str | None) -> None:
+def save(call: Call, file: str, picture: str | None, timeout: Fraction) -> None:
     """The samples are those of equally spaced ticks."""
     from moire.analysis.tick_scope import TickScope
 
-    made = TickScope(call.axis).read()
-    write_bytes(file, made.parquet() if file.endswith(".parquet") else made.csv().encode())
-    if picture:
-        write_bytes(picture, made.picture())
-    call.say_of_axis(
-        {"file": file, **{name: list(values) for name, values in made.columns().items()}},
-        f"{len(made.time_s)} samples of {', '.join(made.values)} in {file}",
-    )
+    write(call, file, TickScope(call.axis).read(timeout=timeout), picture)
+
+
+@group.command(
+    "stream",
+    help="Record signals of an axis without a gap for some time, longer than fits into the memory "
+    "of the node: it is read meanwhile. The bus limits the rate: if the memory becomes full, this "
+    "is an error.",
+    example="moire scope stream hour.parquet --signals error --every 10ms --time 1h",
+)
+@click.argument("file", type=FILE, metavar="FILE", help=COLUMNS)
+@WHAT
+@EVERY
+@click.option(
+    "--time",
+    "duration",
+    type=DURATION,
+    default="10s",
+    metavar="TIME",
+    help="How long. The default is 10s.",
+)
+@PICTURE
+def stream(
+    call: Call,
+    file: str,
+    signals: str,
+    every: Fraction | None,
+    duration: Fraction,
+    picture: str | None,
+) -> None:
+    """The drive stays as it is."""
+    from moire.analysis.tick_scope import TickScope, joined
+
+    made = joined(list(TickScope(call.axis).stream(names(signals), every, duration)))
+    rate = len(names(signals)) / (made.every * made.tick_s)
+    write(call, file, made, picture, f", {rate:.4g} words/s without a gap")

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Machines as twins in lockstep with LinuxCNC, RTL and firmware: each packet is a servo period of
+the machine's time. MILL is that of constraints/machines/mill_linuxcnc.toml: three steppers and 1 um
+scales. STAGE is that of S0, both axes in one node: interferometers and motors.
+"""
+
+import random
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from types import TracebackType
+from typing import Self
+
+import numpy
+
+from experiments.s2_stage import CLK_HZ, Scale
+from experiments.s2_stage import NODE as STEPPERS
+from linuxcnc_config.generate import SERVO_MS, Configuration, Joint, load
+from linuxcnc_config.programs import Points
+from linuxcnc_config.set_up import set_up
+from moire.bus.link_gateway import LinkGateway
+from moire.client.bus import Bus
+from moire.units import Value
+from twin import Twin, TwinTransport, build
+from twin.nodes.twin import ALL_AXES, NODE, Axis, Node
+
+PERIOD_S = 4e-3  # a request and a reply of three axes take 2.7 ms of the slow clock of the twin
+DELAY_MS = 12.0  # until a set-point: two periods, the packet, and 4 ticks
+SESSION = 0x4D1
+PARTS = 8  # of a period, at whose ends the positions are recorded
+LSB, COUNTS = 1 << 16, 4  # of a position, and of a scale, in a signal period
+SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """What a machine is made of; the index or phase zero of each axis is at whole periods."""
+
+    configuration: Configuration
+    axis: Axis
+    image: str
+    parameters: Mapping[str, int]  # of rtl/node.sv
+    settings: Mapping[str, Value] = field(default_factory=dict)  # parameters of each axis
+    backlash: tuple[Value, Value, Value] | None = None  # as in Axis.set_backlash
+
+
+MILL = Plant(
+    load("mill_linuxcnc"),
+    SCALE.machine(),
+    "steps_stream",
+    {**STEPPERS, "HAS_BACKLASH": ALL_AXES},
+    {**SCALE.settings(), "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"},
+    ("5um", "1mm/s", "0.25um"),
+)
+STAGE = Plant(
+    Configuration(
+        name="stage",
+        file="",
+        title="S0",
+        address=1,
+        bus="",
+        node="",
+        delay_ms=DELAY_MS,
+        period_ns=round(SERVO_MS * 1e6),
+        axes=[Joint(name, 0.8, -0.5, 100, 4, 50, 0, 0, 0) for name in "XY"],
+    ),
+    Axis("stage"),
+    "stream",
+    NODE,
+)
+
+
+class TwinMachine:
+    """The powered-up machine, its link set up, served at a UDP port of this computer."""
+
+    def __init__(self, plant: Plant, seed: int = 1) -> None:
+        self.plant, self.axes = plant, len(plant.configuration.axes)
+        parameters = {**plant.parameters, "HAS_SET_POINTS": ALL_AXES, "HAS_LINK": 1}
+        self.twin = Twin(
+            [Node(1, [plant.axis] * self.axes)],
+            seed=seed,
+            clk_hz=CLK_HZ,
+            firmware=build.firmware(plant.image, self.axes),
+            node_parameters=parameters,
+        )
+        bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed))
+        self.twin.run_until_ready()
+        for number in range(self.axes):
+            axis = bus.axis(1, number)
+            for name, value in plant.settings.items():
+                axis.set_parameter(name, value)
+            axis.set_parameter("watchdog_time", 0)  # of the bus, which is silent
+            if plant.backlash:
+                axis.set_backlash(*plant.backlash)
+        self.node = bus.node(1)
+        self.line = self.twin.link()
+        set_up(self.node, self.axes, SESSION, bit_time=self.line.bit_time, watchdog_s=0)
+        self.path: list[tuple[float, ...]] = []  # mm of each axis at each part
+        self.gateway = LinkGateway(self, PERIOD_S)
+        self.thread = threading.Thread(target=self.gateway.serve, daemon=True)
+
+    def configuration(self) -> Configuration:
+        """That of LinuxCNC for this twin."""
+        behind_ms = DELAY_MS + 2e3 * PERIOD_S
+        axes = [
+            replace(axis, following=axis.velocity * behind_ms * 2e-3)
+            for axis in self.plant.configuration.axes
+        ]
+        return replace(
+            self.plant.configuration,
+            bus="",
+            node="udp:{}:{}".format(*self.gateway.address),
+            session=SESSION,
+            delay_ms=DELAY_MS,
+            period_ns=round(PERIOD_S * 1e9),
+            axes=axes,
+            simulated=True,
+        )
+
+    def exchange(self, data: bytes, seconds: float) -> bytes:
+        """The machine runs, with bytes to the node at its begin; returns those from the node."""
+        self.line.send(data)
+        for _ in range(PARTS):
+            self.twin.run(seconds / PARTS)
+            where = (self.twin.machine(n).state.position_m * 1e3 for n in range(self.axes))
+            self.path.append(tuple(where))
+        return self.line.take()
+
+    def apart(self, number: int) -> int:
+        """Counts of the node minus counts of the scale in the model, while the scale is at rest."""
+        while True:
+            scale = self.twin.truth(number).scale_counts
+            position = self.node.read_named("axis.position", number)["value"]
+            if scale == self.twin.truth(number).scale_counts:
+                return int(position * COUNTS // LSB - scale)
+
+    def zero_mm(self, number: int) -> float:
+        """The true position of the zero of an axis, which is a whole number of periods away from
+        where the model has a zero."""
+        period = self.plant.configuration.axes[number].period_um * 1e-3
+        model = self.plant.axis.parameters.get("scale_index_position", 0.0) * 1e3
+        count = self.node.read_named("axis.position", number)["value"]
+        apart = self.twin.machine(number).state.position_m * 1e3 - count / LSB * period - model
+        return model + round(apart / period) * period
+
+    def true_path(self) -> Points:
+        """Rows of X, Y, Z in mm, true positions of the tables, from the zeros; Z is 0 without an
+        axis. After the end of LinuxCNC.
+        """
+        found: Points = numpy.zeros((len(self.path), 3))
+        found[:, : self.axes] = self.path
+        found[:, : self.axes] -= [self.zero_mm(n) for n in range(self.axes)]
+        return found
+
+    def __enter__(self) -> Self:
+        self.thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.gateway.stop()
+        self.thread.join()
+        self.gateway.socket.close()
+        self.twin.close()

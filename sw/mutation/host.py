@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which faults inside a module of the host no test of the module sees.
+
+    python -m mutation.host [MODULE …]      mutants of these modules, or of all; see --help
+
+Cosmic Ray (`make cosmicray`) makes the mutants: one operator, comparison, number or the like of
+the source is another one. mutation.host_tests runs the tests of host.toml on each of them. What no
+test sees is a survivor. It needs a better test, or a reason in host.toml. Nothing proves that a
+mutant is equivalent to the module.
+"""
+
+import argparse
+import ast
+import fnmatch
+import json
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from mutation import record
+from mutation.block import BUILD, MutationError
+from twin.build import ROOT
+
+MUTANTS = 100  # of a module
+TABLE = Path(__file__).with_name("host.toml")
+COSMIC_RAY = ROOT / "build" / "cosmic_ray"
+PATIENCE, LEAST_S = 3, 5  # a run has no end if it takes so many times as without a mutant, and 5 s
+UNLIMITED_S = 3600
+
+
+class NotInstalled(MutationError):
+    """Cosmic Ray is not there."""
+
+
+@dataclass(frozen=True)
+class HostMutant:
+    """One fault in a module."""
+
+    module: str
+    line: int
+    old: str  # the line of the source without its indentation
+    new: str  # the same line of the mutant, or an empty text if it is gone
+    text: str  # of the whole mutant
+
+    @property
+    def words(self) -> str:
+        """One line for a person."""
+        path = path_of(self.module).relative_to(ROOT)
+        return f"{path}:{self.line}: {self.old} -> {self.new or '(nothing)'}"
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why no test can find some mutants of a line."""
+
+    module: str
+    line: str  # of the source, without its indentation
+    mutant: str  # pattern of the line of the mutant
+    why: str
+
+    def explains(self, mutant: HostMutant) -> bool:
+        """Whether it is about this mutant."""
+        return (self.module, self.line) == (mutant.module, mutant.old) and fnmatch.fnmatchcase(
+            mutant.new, self.mutant
+        )
+
+
+@dataclass
+class Verdicts:
+    """What became of the mutants of a module."""
+
+    killed: int = 0
+    survivors: list[HostMutant] = field(default_factory=list)  # without a reason
+    explained: list[tuple[HostMutant, Reason]] = field(default_factory=list)
+    stale: list[str] = field(default_factory=list)  # reasons whose mutants are all found
+
+    @property
+    def tried(self) -> int:
+        """All mutants."""
+        return self.killed + len(self.survivors) + len(self.explained)
+
+    @property
+    def words(self) -> str:
+        return (
+            f"{self.killed} of {self.tried} found, {len(self.survivors)} survivors, "
+            f"{len(self.explained)} explained, {len(self.stale)} stale reasons"
+        )
+
+
+@cache
+def table() -> Mapping[str, object]:
+    """host.toml."""
+    return tomllib.loads(TABLE.read_text())
+
+
+def tests() -> dict[str, list[str]]:
+    """{module: files of its tests}"""
+    found = table()["tests"]
+    assert isinstance(found, dict)
+    return found
+
+
+def reasons() -> list[Reason]:
+    """The reasons of host.toml. MutationError names one whose line does not exist."""
+    entries = table().get("reason", [])
+    assert isinstance(entries, list)
+    found = [Reason(**entry) for entry in entries]
+    for reason in found:
+        lines = path_of(reason.module).read_text().splitlines()
+        if reason.line not in [line.strip() for line in lines]:
+            raise MutationError(f"host.toml: {reason.module} has no line {reason.line!r}")
+    return found
+
+
+def path_of(module: str) -> Path:
+    """The source of a module."""
+    return ROOT / "sw" / "host" / (module.replace(".", "/") + ".py")
+
+
+def annotations(source: str) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+    """Where the types of a source stand, (line, column) from … to: they do nothing."""
+    for node in ast.walk(ast.parse(source)):
+        for name in ("annotation", "returns"):
+            kind = getattr(node, name, None)
+            if isinstance(kind, ast.expr):
+                assert kind.end_lineno is not None and kind.end_col_offset is not None
+                yield (kind.lineno, kind.col_offset), (kind.end_lineno, kind.end_col_offset)
+
+
+def difference(module: str, source: str, text: str) -> HostMutant:
+    """The mutant that this text is."""
+    old, new = source.splitlines(), text.splitlines()
+    at = next(n for n, (a, b) in enumerate(zip([*old, ""], [*new, ""])) if a != b)
+    same_length = len(old) == len(new)
+    return HostMutant(module, at + 1, old[at].strip(), new[at].strip() if same_length else "", text)
+
+
+def mutants_of(module: str, count: int, seed: int) -> list[HostMutant]:
+    """So many mutants of a module, spread over the places of its source; fewer if it has fewer."""
+    if str(COSMIC_RAY) not in sys.path:
+        sys.path.append(str(COSMIC_RAY))
+    if not find_spec("cosmic_ray"):
+        raise NotInstalled("Cosmic Ray is not installed: make cosmicray")
+    from cosmic_ray.ast import ast_nodes, get_ast  # only there after `make cosmicray`
+    from cosmic_ray.mutating import mutate_code
+    from cosmic_ray.plugins import get_operator, operator_names
+
+    source = path_of(module).read_text()
+    tree, types = get_ast(source), list(annotations(source))
+    places: dict[tuple[int, int], list[tuple[str, int]]] = defaultdict(list)
+    for name in sorted(operator_names()):
+        operator = get_operator(name)
+        if operator.arguments():
+            continue
+        positions = [
+            begin for node in ast_nodes(tree) for begin, _ in operator().mutation_positions(node)
+        ]
+        for occurrence, begin in enumerate(positions):
+            if not any(low <= begin < high for low, high in types):
+                places[begin].append((name, occurrence))
+    draw = random.Random(f"{module} {seed}")
+    for choices in places.values():
+        draw.shuffle(choices)
+    order = [places[begin] for begin in draw.sample(sorted(places), len(places))]
+    found: dict[str, HostMutant] = {}
+    while order and len(found) < count:
+        choices = order.pop(0)
+        name, occurrence = choices.pop()
+        if choices:
+            order.append(choices)
+        text = mutate_code(source, get_operator(name)(), occurrence)
+        if text is not None and text != source:
+            found[text] = difference(module, source, text)
+    return list(found.values())
+
+
+def runs(
+    module: str, texts: Sequence[str], seed: int, longest_s: float
+) -> Iterator[tuple[int, str, float]]:
+    """(number of the text, the test that failed or "", computing time in s) of each text."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=BUILD, prefix="host-") as folder:
+        request = Path(folder) / "request.json"
+        asked = {
+            "module": module,
+            "path": str(path_of(module)),
+            "tests": tests()[module],
+            "texts": list(texts),
+            "seed": seed,
+            "longest_s": longest_s,
+        }
+        request.write_text(json.dumps(asked))
+        running = subprocess.Popen(
+            [sys.executable, "-m", "mutation.host_tests", str(request)],
+            cwd=ROOT,
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path]),
+                "OPENBLAS_NUM_THREADS": "1",
+                "HYPOTHESIS_STORAGE_DIRECTORY": folder,
+            },
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert running.stdout
+        for line in running.stdout:
+            number, failed, seconds = json.loads(line)
+            yield number, failed, seconds
+        if running.wait():
+            raise MutationError(f"{module}: the runs ended with exit code {running.returncode}")
+
+
+def measured(module: str, count: int = MUTANTS, seed: int = 1) -> Verdicts:
+    """Run the tests of a module on so many mutants of it."""
+    known = [reason for reason in reasons() if reason.module == module]
+    mutants, source = mutants_of(module, count, seed), path_of(module).read_text()
+    [(_, failed, seconds)] = runs(module, [source], seed, UNLIMITED_S)
+    if failed:
+        raise MutationError(f"{module}: without a mutant {failed} fails")
+    verdicts, met = Verdicts(), dict[Reason, bool]()  # whether it is needed
+    longest_s = PATIENCE * seconds + LEAST_S
+    for number, failed, _ in runs(module, [mutant.text for mutant in mutants], seed, longest_s):
+        mutant = mutants[number]
+        reason = next((reason for reason in known if reason.explains(mutant)), None)
+        if reason:
+            met[reason] = met.get(reason, False) or not failed
+        if failed:
+            verdicts.killed += 1
+        elif reason:
+            verdicts.explained.append((mutant, reason))
+        else:
+            verdicts.survivors.append(mutant)
+    verdicts.stale = [
+        f"{r.module}: {r.line}: {r.mutant}" for r, needed in met.items() if not needed
+    ]
+    return verdicts
+
+
+def entry_of(verdicts: Verdicts, count: int, seed: int) -> record.Entry:
+    """What docs/mutants.toml says of a module."""
+    return {
+        "mutants": verdicts.tried,
+        "seed": seed,
+        "asked": count,
+        "found": verdicts.killed,
+        "survivors": [mutant.words for mutant in verdicts.survivors],
+        "explained": [f"{mutant.words}: {reason.why}" for mutant, reason in verdicts.explained],
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m mutation.host")
+    parser.add_argument("modules", nargs="*", help="modules of host.toml; default: all")
+    parser.add_argument("--list", action="store_true", help="print the modules, run nothing")
+    parser.add_argument("--count", type=int, default=MUTANTS, help="mutants of each module")
+    parser.add_argument("--seed", type=int, default=1, help="which mutants, 1 and up")
+    parser.add_argument("--record", action="store_true", help="add the results to docs")
+    options = parser.parse_args(arguments)
+    if unknown := set(options.modules) - set(tests()):
+        parser.error(f"{sorted(unknown)[0]} has no tests in sw/mutation/host.toml")
+    names = options.modules or sorted(tests())
+    if options.list:
+        print(*names, sep="\n")
+        return 0
+    wrong = 0
+    for name in names:
+        try:
+            verdicts = measured(name, options.count, options.seed)
+        except MutationError as error:
+            print(error, file=sys.stderr, flush=True)
+            wrong += 1
+            continue
+        print(f"{name}: {verdicts.words}", flush=True)
+        for mutant in verdicts.survivors:
+            print(f"  {mutant.words}", flush=True)
+        for line in verdicts.stale:
+            print(f"  stale reason: {line}", flush=True)
+        wrong += len(verdicts.survivors) + len(verdicts.stale)
+        if options.record:
+            record.add(name, entry_of(verdicts, options.count, options.seed))
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

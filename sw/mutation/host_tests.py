@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs the tests of a module of the host once for each mutant of it, in processes that fork off.
+
+    python -m mutation.host_tests REQUEST.json
+
+The request has the name of the module, its tests, a text of the module for each mutant, the seed of
+the tests and the longest computing time of a run in s. The program loads what the tests need from
+other packages, but nothing of this project. For each text it forks a process that imports the
+module from this text and runs the tests until one fails. Each line of the output is JSON:
+[number of the text, the test that failed, computing time in s]; the name of the test is empty for a
+survivor. It is `(no end)` if the run takes longer than it may, and `(the process ends by itself)`
+if no test has failed then.
+"""
+
+import importlib.abc
+import importlib.machinery
+import json
+import os
+import resource
+import signal
+import sys
+from collections.abc import Sequence
+from importlib.util import spec_from_file_location
+from pathlib import Path
+from types import CodeType, ModuleType
+
+import hypothesis
+import numpy as np
+import pytest
+import rich.console
+
+from twin.build import ROOT
+
+NO_END, ENDS = "(no end)", "(the process ends by itself)"
+WAITING = 10  # a run that waits takes no computing time: the clock may show so many times more
+LOADED = (hypothesis, np, rich.console)  # for all forks at once
+
+
+class TextLoader(importlib.machinery.SourceFileLoader):
+    """Loads a module from another text than that of its file."""
+
+    def __init__(self, name: str, path: str, text: str):
+        super().__init__(name, path)
+        self.text = text
+
+    def get_code(self, fullname: str) -> CodeType:
+        """The code of the text, with the name of the file."""
+        return compile(self.text, self.path, "exec", dont_inherit=True)
+
+
+class TextFinder(importlib.abc.MetaPathFinder):
+    """Finds one module, with another text."""
+
+    def __init__(self, name: str, path: Path, text: str):
+        self.name, self.path, self.text = name, str(path), text
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        """The specification of the module; None for any other one."""
+        if fullname != self.name:
+            return None
+        loader = TextLoader(fullname, self.path, self.text)
+        return spec_from_file_location(fullname, self.path, loader=loader)
+
+
+class FirstFailure:
+    """A plug-in of pytest that writes the name of the test that fails into a pipe."""
+
+    def __init__(self, pipe: int):
+        self.pipe = pipe
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Called after each phase of a test."""
+        if report.failed:
+            os.write(self.pipe, report.nodeid.encode())
+
+
+def run(finder: TextFinder, tests: Sequence[str], pipe: int) -> int:
+    """Run the tests on a text, in a process of its own; the exit code is that of pytest."""
+    null = os.open(os.devnull, os.O_RDWR)
+    for stream in (0, 1, 2):
+        os.dup2(null, stream)
+    sys.meta_path.insert(0, finder)
+    options = ["-x", "-q", "-p", "no:cacheprovider", "--rootdir", str(ROOT)]
+    return int(pytest.main([*options, *tests], plugins=[FirstFailure(pipe)]))
+
+
+def forked(finder: TextFinder, tests: Sequence[str], longest_s: float) -> tuple[str, float]:
+    """The test that failed, and the computing time of the run in s."""
+    end, pipe = os.pipe()
+    pid = os.fork()
+    if not pid:
+        resource.setrlimit(resource.RLIMIT_CPU, (int(longest_s) + 1, int(longest_s) + 2))
+        signal.alarm(WAITING * (int(longest_s) + 1))
+        os._exit(run(finder, tests, pipe))
+    os.close(pipe)
+    with os.fdopen(end) as file:
+        failed = file.read()
+    _, status, used = os.wait4(pid, 0)
+    seconds = used.ru_utime + used.ru_stime
+    if status and os.WIFSIGNALED(status):
+        stopped = os.WTERMSIG(status) in (signal.SIGALRM, signal.SIGXCPU, signal.SIGKILL)
+        return NO_END if stopped else ENDS, seconds
+    return failed or (ENDS if status else ""), seconds
+
+
+def main(request: Path) -> None:
+    asked = json.loads(request.read_text())
+    os.environ["SEED"] = str(asked["seed"])
+    for number, text in enumerate(asked["texts"]):
+        finder = TextFinder(asked["module"], Path(asked["path"]), text)
+        failed, seconds = forked(finder, asked["tests"], asked["longest_s"])
+        print(json.dumps([number, failed, seconds]), flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
