@@ -144,7 +144,7 @@ class Metrology:
         if self.still_nm is not None:
             made["standstill"] = (
                 f"Standstill of the {axis}: amplitude spectral density of the true error, and its "
-                "rms up to each frequency",
+                "rms up to each frequency, without what is slower than a segment",
                 metrology_pictures.standstill(self.still_nm, RATE_HZ),
             )
             made["allan"] = (

@@ -804,6 +804,16 @@ def test_a_file_of_commands_is_carried_out(tmp_path):
     assert call.results[-1]["position_nm"] == 500_000 and not node.axes[0].enabled
 
 
+def test_a_long_file_identifies_its_node_once(tmp_path):
+    file, node = tmp_path / "many.txt", BusNode()
+    file.write_text("status\n" * 300)
+    call = Call(["run", str(file)], node)
+    assert call.code == 0 and node.executed.count("status") == 300
+    once = BusNode()
+    Call("status", once)
+    assert node.executed == once.executed[:2] + 300 * once.executed[2:]
+
+
 @pytest.mark.parametrize(
     "text, message",
     [

@@ -147,6 +147,7 @@ class Axis:
     stop = awaited(blocking_axis.Axis.stop)
     stop_and_wait = awaited(blocking_axis.Axis.stop_and_wait)
     take_over = awaited(blocking_axis.Axis.take_over)
+    set_backlash = awaited(blocking_axis.Axis.set_backlash)
     override = awaited(blocking_axis.Axis.override)
     pause = awaited(blocking_axis.Axis.pause)
     resume = awaited(blocking_axis.Axis.resume)

@@ -49,7 +49,9 @@ class Density:
 
     @property
     def cumulative_rms(self) -> Array:
-        """The rms of all that happens up to each frequency; the last one is the rms of all."""
+        """The rms of all that happens up to each frequency. The last one is the rms of the values
+        without what is slower than a segment.
+        """
         width_hz = self.frequency_hz[1] - self.frequency_hz[0]
         return numpy.asarray(numpy.sqrt(numpy.cumsum(self.power) * width_hz))
 
