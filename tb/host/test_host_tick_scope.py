@@ -158,6 +158,16 @@ def test_a_stream_has_every_sample_once_for_as_long_as_it_is_to_last():
     assert all(after - before == -6 for before, after in zip(errors, errors[1:]))
 
 
+def test_a_stream_ends_with_its_duration_although_more_samples_wait():
+    node = node_of()
+    stream = scope_of(node).stream(["error"], duration="100ms")
+    got = len(next(stream).time_s)
+    node.run(WORDS // 8)
+    rest = [len(record.time_s) for record in stream]
+    assert got + sum(rest) == 400
+    assert len(node.scope.recorded) - node.scope.taken > 100, "and they stay where they are"
+
+
 def test_a_stream_that_is_not_read_in_time_ends_with_what_the_memory_holds():
     node = node_of()
     scope = scope_of(node)

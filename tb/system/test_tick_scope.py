@@ -12,7 +12,7 @@ from moire.analysis.tick_scope import SIGNALS, TickScope, Trigger
 from moire.analysis.tune import NotTuned
 from moire.bus.transport import open_bus
 from moire.client.bus import Bus
-from moire.errors import OutOfRange
+from moire.errors import MotionFailed, OutOfRange
 from tb.bench import seed
 from tb.fakes.served import ServedTransport
 from twin import WITH_SCOPE, Twin, TwinTransport
@@ -132,6 +132,18 @@ def test_without_room_on_either_side_nothing_moves(axis, short_periods):
         frequency_response.measure(axis, **SHORT)
     axis.write_parameter("travel_high", before.counts)
     assert axis.status().target_nm == pytest.approx(40_000, abs=1)
+
+
+def test_a_fault_in_a_record_is_named_and_nothing_is_measured(axis, short_periods):
+    axis.move("3mm")
+    limit, override = axis.get_parameter("following_limit"), axis.override()
+    axis.set_parameter("following_limit", "4um")
+    with pytest.raises(MotionFailed, match="following error"):
+        frequency_response.measure(axis, "40%", **SHORT)
+    assert axis.override() == override and not axis.status().in_motion
+    axis.reset()
+    axis.write_parameter("following_limit", limit.counts)
+    axis.enable()
 
 
 def test_the_response_is_measured_through_a_slow_connection_on_the_side_with_room(

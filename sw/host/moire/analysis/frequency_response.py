@@ -429,7 +429,6 @@ def recorded(
                 with slowed(axis, speed_nm_s):
                     axis.begin_move(nm=end_nm)
                     scope.wait()
-                    axis.stop_and_wait()
             values = scope.read().values
         status = axis.status()
         if status.faults:
@@ -464,12 +463,13 @@ def stroke(axis: Axis, period: int, speed_nm_s: float, approach: float) -> Fract
 
 @contextmanager
 def slowed(axis: Axis, speed_nm_s: float) -> Iterator[None]:
-    """The axis with an override for this speed, as long as the block lasts."""
+    """The axis with an override for this speed, as long as the block lasts; then it stops."""
     override = axis.override()
     axis.override(min(1.0, speed_nm_s / top_speed_nm_s(axis)))
     try:
         yield
     finally:
+        axis.stop_if_enabled()
         axis.override(override)
 
 

@@ -439,7 +439,8 @@ class TickScope:
             whole = len(words) // len(chosen)
             if left is not None:
                 whole = min(whole, left - given)
-            if whole and (len(some) < WORDS_AT_ONCE or whole >= STREAM_SAMPLES):
+            complete = given + whole == left
+            if whole and (complete or len(some) < WORDS_AT_ONCE or whole >= STREAM_SAMPLES):
                 yield self.record_of(setting, words[: whole * len(chosen)], given)
                 del words[: whole * len(chosen)]
                 given += whole

@@ -166,8 +166,8 @@ def write(call: Call, file: str, made: TickRecord, picture: str | None, more: st
     "record",
     help="Record signals of an axis at each servo tick, or at one in some, from now on or from a "
     "trigger on; return at once.",
-    example="moire --port twin home -- scope record --trigger beyond --of error --level 50nm "
-    "--before 1000 -- move 100um -- scope save move.csv",
+    example="moire --port twin home -- scope record --trigger beyond --of target_velocity "
+    "--level 4mm/s --before 100 -- move 100um -- scope save move.csv",
 )
 @WHAT
 @click.option(
@@ -204,7 +204,8 @@ def write(call: Call, file: str, made: TickRecord, picture: str | None, more: st
     type=WHOLE,
     default=0,
     metavar="N",
-    help="The number of samples from before the trigger. The default is 0.",
+    help="The number of samples from before the trigger, which counts once there are so many. The "
+    "default is 0.",
 )
 def record(
     call: Call,
