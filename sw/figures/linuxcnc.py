@@ -3,7 +3,6 @@
 the driver. They need LinuxCNC: `make linuxcnc`.
 """
 
-import random
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -13,8 +12,7 @@ from pathlib import Path
 from figures.common import Absent, Figure, Quick, console
 from linuxcnc_config.headless import RULES, SOURCES, missing, run
 from linuxcnc_config.programs import PROGRAMS, STAGE_PROGRAMS, Program
-from linuxcnc_config.twin_machine import MILL, PERIOD_S, SESSION, STAGE, Plant, TwinMachine
-from moire.bus.cobs import sealed
+from linuxcnc_config.twin_machine import MILL, STAGE, Plant, TwinMachine
 from moire.errors import MoireError
 from twin.build import ROOT
 
@@ -22,7 +20,6 @@ PARTS = ("axis", "carrier", "node", "node_clock", "packet")
 OPTIONS = ("-O2", "-std=gnu11", "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-Drealtime")
 MEDIAN_US = 10.0
 PERIODS = 100_000
-HOMINGS, LOST = 10**4, 0.01
 TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
 PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
 STILL_MM = 0.003  # a stepper that settles on its scale of 1 um
@@ -98,54 +95,6 @@ def bench(name: str) -> Path:
     return program
 
 
-class Losses:
-    """Loses packets of a line in lockstep, requests and replies alike: the driver gets one byte."""
-
-    def __init__(self, line: TwinMachine, seed: int) -> None:
-        self.line, self.random = line, random.Random(seed)
-        self.share, self.lost = 0.0, 0
-
-    def exchange(self, data: bytes, seconds: float) -> bytes:
-        """A period of the machine."""
-        if self.random.random() >= self.share:
-            return self.line.exchange(data, seconds)
-        self.lost += 1
-        self.line.exchange(self.random.choice((data, b"")), seconds)
-        return sealed(b"?")
-
-
-def index_home_wrong(homings: int = HOMINGS, seed: int = 1) -> float:
-    """The first homing has all packets; each further one must find the same counts for the same
-    place.
-    """
-    program = bench("homing_bench")
-    with TwinMachine(MILL, seed) as mill:
-        mill.gateway.line = losses = Losses(mill, seed)
-        scale = 1000 / MILL.configuration.axes[0].period_um
-        words = [mill.gateway.address[1], SESSION, mill.axes, scale, round(PERIOD_S * 1e9)]
-        process = subprocess.Popen(
-            [program, *map(str, words)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert process.stdin and process.stdout
-        wrong, first = 0, None
-        for _ in range(-(-homings // mill.axes) + 1):
-            if (answer := process.stdout.readline()) != "homed\n":
-                raise MoireError(f"the driver did not home: {answer.strip()}")
-            found = [mill.apart(n) for n in range(mill.axes)]
-            first = first or found
-            wrong += sum(one != other for one, other in zip(found, first, strict=True))
-            losses.share = LOST
-            process.stdin.write("\n")
-            process.stdin.flush()
-        process.kill()
-        process.wait()
-    console.print(f"{losses.lost} packets lost in {homings} homings, {wrong} counts wrong")
-    return wrong
-
-
 def thread_us_max(periods: int = PERIODS) -> float:
     program = bench("thread_bench")
     out = subprocess.run([program, str(periods), "3"], check=True, capture_output=True, text=True)
@@ -183,15 +132,6 @@ FIGURES = {
         "<= 0.2",
         Quick({}, "the whole figure"),
         3,
-    ),
-    "index_home_wrong": Figure(
-        index_home_wrong,
-        "homings",
-        "of 10^4 homings to an index by the driver's index-enable, 1 % of packets lost, in "
-        "lockstep with the simulated mill: another count of the same place than without loss",
-        "0",
-        Quick({"homings": 3}, "3 homings"),
-        0,
     ),
     "thread_us_max": Figure(
         thread_us_max,

@@ -17,7 +17,7 @@ NEAR_MM, CLOSE_MM = 0.02, 0.005  # at a place: not gone yet, and come there
 # The last bit to the start is slow, so that the machine has settled when the program begins. A
 # dwell would be one of the computer's time, which is not that of a simulated machine.
 BEFORE_MM, SETTLING_FEED = 0.05, 20  # 0.15 s
-FIRST_LINE = 6
+DWELL, FIRST_LINE = "G4 P0.1", 7
 
 Points = NDArray[numpy.float64]  # n rows of X, Y, Z
 Point = tuple[float, float, float]
@@ -126,11 +126,13 @@ class Program:
         x, y, z = self.start
         lines = [
             "G21 G90 G17 G91.1 G40 G49",
-            self.mode,
+            "G61",
             f"G0 X{x - BEFORE_MM:.6f} Y{y:.6f} Z{z:.6f}",
             f"G1 X{x:.6f} F{SETTLING_FEED}",
-            f"F{self.feed:g}",
+            DWELL,
+            f"{self.mode} F{self.feed:g}",
             *(move.code() for move in self.moves),
+            DWELL,
             "M2",
         ]
         text = "\n".join(lines) + "\n"

@@ -29,7 +29,7 @@ PERIOD_S = 4e-3  # a request and a reply of three axes take 2.7 ms of the slow c
 DELAY_MS = 12.0  # until a set-point: two periods, the packet, and 4 ticks
 SESSION = 0x4D1
 PARTS = 8  # of a period, at whose ends the positions are recorded
-LSB, COUNTS = 1 << 16, 4  # of a position, and of a scale, in a signal period
+LSB = 1 << 16  # of a position, in a signal period
 SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
 
 
@@ -126,14 +126,6 @@ class TwinMachine:
             where = (self.twin.machine(n).state.position_m * 1e3 for n in range(self.axes))
             self.path.append(tuple(where))
         return self.line.take()
-
-    def apart(self, number: int) -> int:
-        """Counts of the node minus counts of the scale in the model, while the scale is at rest."""
-        while True:
-            scale = self.twin.truth(number).scale_counts
-            position = self.node.read_named("axis.position", number)["value"]
-            if scale == self.twin.truth(number).scale_counts:
-                return int(position * COUNTS // LSB - scale)
 
     def zero_mm(self, number: int) -> float:
         """The true position of the zero of an axis, which is a whole number of periods away from
