@@ -134,7 +134,7 @@ class TwinMachine:
         model = self.plant.axis.parameters.get("scale_index_position", 0.0) * 1e3
         count = self.node.read_named("axis.position", number)["value"]
         apart = self.twin.machine(number).state.position_m * 1e3 - count / LSB * period - model
-        return model + round(apart / period) * period
+        return float(model + round(apart / period) * period)
 
     def true_path(self) -> Points:
         """Rows of X, Y, Z in mm, true positions of the tables, from the zeros; Z is 0 without an
