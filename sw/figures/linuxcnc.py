@@ -5,14 +5,14 @@ the driver. They need LinuxCNC: `make linuxcnc`.
 
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 from figures.common import Absent, Figure, Quick, console
 from linuxcnc_config.headless import RULES, SOURCES, missing, run
-from linuxcnc_config.programs import PROGRAMS, STAGE_PROGRAMS, Program
-from linuxcnc_config.twin_machine import MILL, STAGE, Plant, TwinMachine
+from linuxcnc_config.programs import PROGRAMS
+from linuxcnc_config.twin_machine import MILL, TwinMachine
 from moire.errors import MoireError
 from twin.build import ROOT
 
@@ -26,15 +26,9 @@ STILL_MM = 0.003  # a stepper that settles on its scale of 1 um
 BLEND_MM = {"corners": 0.05}  # tolerance of its G64
 
 
-MACHINES: dict[str, tuple[Plant, Mapping[str, Program]]] = {
-    "mill": (MILL, PROGRAMS),
-    "stage": (STAGE, STAGE_PROGRAMS),
-}
-
-
 @cache
-def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]:
-    """{program: largest distance of the true path from it} of programs of a machine; a program that
+def errors_mm(names: Sequence[str], seed: int) -> dict[str, float]:
+    """{program: largest distance of the true path from it} of programs of the mill; a program that
     did not end is not in it.
     """
     if reason := missing():
@@ -42,10 +36,8 @@ def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]
     steps: list[list[str | float]] = [["patience", PATIENCE_S], ["on"], ["home"]]
     for name in names:
         steps += [["start", f"{name}.ngc"], ["finish"]]
-    plant, programs = MACHINES[machine]
-    letters = "".join(axis.name for axis in plant.configuration.axes)
-    texts = {f"{name}.ngc": programs[name].text(letters) for name in names}
-    with tempfile.TemporaryDirectory() as folder, TwinMachine(plant, seed) as served:
+    texts = {f"{name}.ngc": PROGRAMS[name].text() for name in names}
+    with tempfile.TemporaryDirectory() as folder, TwinMachine(MILL, seed) as served:
         ran = run(served.configuration(), Path(folder), steps, texts)
         path = served.true_path()
     if not ran.report:
@@ -53,29 +45,21 @@ def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]
     ended = [row["done"] for row in ran.report if row["step"] == ["finish"]]
     found: dict[str, float] = {}
     for name in [name for name, done in zip(names, ended) if done]:
-        distances, path = programs[name].errors(path, STILL_MM)
+        distances, path = PROGRAMS[name].errors(path, STILL_MM)
         found[name] = float(distances.max())
         console.print(f"{name}: largest distance from the path {1000 * found[name]:.3f} um")
     return found
 
 
 def linuxcnc_programs_failed(names: Sequence[str] = tuple(PROGRAMS), seed: int = 1) -> float:
-    found = errors_mm("mill", tuple(names), seed)
+    found = errors_mm(tuple(names), seed)
     return sum(
         name not in found or found[name] > TOLERANCE_MM + BLEND_MM.get(name, 0) for name in names
     )
 
 
 def linuxcnc_mill_um(names: Sequence[str] = ("circle",), seed: int = 1) -> float:
-    return largest_um("mill", names, seed)
-
-
-def linuxcnc_circle_um(seed: int = 1) -> float:
-    return largest_um("stage", ("circle",), seed)
-
-
-def largest_um(machine: str, names: Sequence[str], seed: int) -> float:
-    found = errors_mm(machine, tuple(names), seed)
+    found = errors_mm(tuple(names), seed)
     if missed := set(names) - found.keys():
         raise MoireError(f"{', '.join(missed)} did not end")
     return 1000 * max(found.values())
@@ -123,15 +107,6 @@ FIGURES = {
         "run by LinuxCNC",
         "<= 5",
         Quick({}, "the whole figure"),
-    ),
-    "linuxcnc_circle_um": Figure(
-        linuxcnc_circle_um,
-        "um",
-        "largest distance of the true path of the simulated S0 stage (motors alone, a perfect "
-        "scale) from a circle of 1 mm diameter at 1 mm/s run by LinuxCNC",
-        "<= 0.2",
-        Quick({}, "the whole figure"),
-        3,
     ),
     "thread_us_max": Figure(
         thread_us_max,

@@ -4,7 +4,6 @@ programmed path. Lengths in mm, in X, Y, Z.
 """
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -121,8 +120,8 @@ class Program:
         self.moves.append(Arc(self.place, (x, y), turn, rise))
         return self
 
-    def text(self, letters: str = "XYZ") -> str:
-        """The G-code for a machine of these axes; the first move is in line FIRST_LINE."""
+    def text(self) -> str:
+        """The G-code; the first move is in line FIRST_LINE."""
         x, y, z = self.start
         lines = [
             "G21 G90 G17 G91.1 G40 G49",
@@ -135,8 +134,7 @@ class Program:
             DWELL,
             "M2",
         ]
-        text = "\n".join(lines) + "\n"
-        return text if "Z" in letters else re.sub(" Z[-.0-9]+", "", text)
+        return "\n".join(lines) + "\n"
 
     def errors(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
         """Distances in mm of a path from the program while it was followed, and the path after
@@ -208,7 +206,6 @@ def moments(path: Sequence[Sequence[float]], periods_per_mm: float) -> Points:
     return found
 
 
-STAGE_PROGRAMS = {"circle": circle((1.5, 1.5), 0.5, 0, 60)}  # of S0
 PROGRAMS = {
     "circle": circle((15, 10), 5, 1, 600),
     "pocket": pocket((10, 10), 3, 1, 1, 900),

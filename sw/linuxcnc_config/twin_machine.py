@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Machines as twins in lockstep with LinuxCNC, RTL and firmware: each packet is a servo period of
 the machine's time. MILL is that of constraints/machines/mill_linuxcnc.toml: three steppers and 1 um
-scales. STAGE is that of S0, both axes in one node: interferometers and motors.
+scales.
 """
 
 import random
@@ -16,14 +16,14 @@ import numpy
 
 from experiments.s2_stage import CLK_HZ, Scale
 from experiments.s2_stage import NODE as STEPPERS
-from linuxcnc_config.generate import SERVO_MS, Configuration, Joint, load
+from linuxcnc_config.generate import Configuration, load
 from linuxcnc_config.programs import Points
 from linuxcnc_config.set_up import set_up
 from moire.bus.link_gateway import LinkGateway
 from moire.client.bus import Bus
 from moire.units import Value
 from twin import Twin, TwinTransport, build
-from twin.nodes.twin import ALL_AXES, NODE, Axis, Node
+from twin.nodes.twin import ALL_AXES, Axis, Node
 
 PERIOD_S = 4e-3  # a request and a reply of three axes take 2.7 ms of the slow clock of the twin
 DELAY_MS = 12.0  # until a set-point: two periods, the packet, and 4 ticks
@@ -52,22 +52,6 @@ MILL = Plant(
     {**STEPPERS, "HAS_BACKLASH": ALL_AXES},
     {**SCALE.settings(), "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"},
     ("5um", "1mm/s", "0.25um"),
-)
-STAGE = Plant(
-    Configuration(
-        name="stage",
-        file="",
-        title="S0",
-        address=1,
-        bus="",
-        node="",
-        delay_ms=DELAY_MS,
-        period_ns=round(SERVO_MS * 1e6),
-        axes=[Joint(name, 0.8, -0.5, 100, 4, 50, 0, 0, 0) for name in "XY"],
-    ),
-    Axis("stage"),
-    "stream",
-    NODE,
 )
 
 
