@@ -3,18 +3,16 @@
 the driver. They need LinuxCNC: `make linuxcnc`.
 """
 
-import random
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 from figures.common import Absent, Figure, Quick, console
 from linuxcnc_config.headless import RULES, SOURCES, missing, run
-from linuxcnc_config.programs import PROGRAMS, STAGE_PROGRAMS, Program
-from linuxcnc_config.twin_machine import MILL, PERIOD_S, SESSION, STAGE, Plant, TwinMachine
-from moire.bus.cobs import sealed
+from linuxcnc_config.programs import PROGRAMS
+from linuxcnc_config.twin_machine import MILL, TwinMachine
 from moire.errors import MoireError
 from twin.build import ROOT
 
@@ -22,22 +20,15 @@ PARTS = ("axis", "carrier", "node", "node_clock", "packet")
 OPTIONS = ("-O2", "-std=gnu11", "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-Drealtime")
 MEDIAN_US = 10.0
 PERIODS = 100_000
-HOMINGS, LOST = 10**4, 0.01
 TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
 PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
 STILL_MM = 0.003  # a stepper that settles on its scale of 1 um
 BLEND_MM = {"corners": 0.05}  # tolerance of its G64
 
 
-MACHINES: dict[str, tuple[Plant, Mapping[str, Program]]] = {
-    "mill": (MILL, PROGRAMS),
-    "stage": (STAGE, STAGE_PROGRAMS),
-}
-
-
 @cache
-def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]:
-    """{program: largest distance of the true path from it} of programs of a machine; a program that
+def errors_mm(names: Sequence[str], seed: int) -> dict[str, float]:
+    """{program: largest distance of the true path from it} of programs of the mill; a program that
     did not end is not in it.
     """
     if reason := missing():
@@ -45,10 +36,8 @@ def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]
     steps: list[list[str | float]] = [["patience", PATIENCE_S], ["on"], ["home"]]
     for name in names:
         steps += [["start", f"{name}.ngc"], ["finish"]]
-    plant, programs = MACHINES[machine]
-    letters = "".join(axis.name for axis in plant.configuration.axes)
-    texts = {f"{name}.ngc": programs[name].text(letters) for name in names}
-    with tempfile.TemporaryDirectory() as folder, TwinMachine(plant, seed) as served:
+    texts = {f"{name}.ngc": PROGRAMS[name].text() for name in names}
+    with tempfile.TemporaryDirectory() as folder, TwinMachine(MILL, seed) as served:
         ran = run(served.configuration(), Path(folder), steps, texts)
         path = served.true_path()
     if not ran.report:
@@ -56,29 +45,21 @@ def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]
     ended = [row["done"] for row in ran.report if row["step"] == ["finish"]]
     found: dict[str, float] = {}
     for name in [name for name, done in zip(names, ended) if done]:
-        distances, path = programs[name].errors(path, STILL_MM)
+        distances, path = PROGRAMS[name].errors(path, STILL_MM)
         found[name] = float(distances.max())
         console.print(f"{name}: largest distance from the path {1000 * found[name]:.3f} um")
     return found
 
 
 def linuxcnc_programs_failed(names: Sequence[str] = tuple(PROGRAMS), seed: int = 1) -> float:
-    found = errors_mm("mill", tuple(names), seed)
+    found = errors_mm(tuple(names), seed)
     return sum(
         name not in found or found[name] > TOLERANCE_MM + BLEND_MM.get(name, 0) for name in names
     )
 
 
 def linuxcnc_mill_um(names: Sequence[str] = ("circle",), seed: int = 1) -> float:
-    return largest_um("mill", names, seed)
-
-
-def linuxcnc_circle_um(seed: int = 1) -> float:
-    return largest_um("stage", ("circle",), seed)
-
-
-def largest_um(machine: str, names: Sequence[str], seed: int) -> float:
-    found = errors_mm(machine, tuple(names), seed)
+    found = errors_mm(tuple(names), seed)
     if missed := set(names) - found.keys():
         raise MoireError(f"{', '.join(missed)} did not end")
     return 1000 * max(found.values())
@@ -96,54 +77,6 @@ def bench(name: str) -> Path:
     command = ["gcc", *OPTIONS, *folders, *map(str, sources), "-o", str(program), *links]
     subprocess.run(command, check=True)
     return program
-
-
-class Losses:
-    """Loses packets of a line in lockstep, requests and replies alike: the driver gets one byte."""
-
-    def __init__(self, line: TwinMachine, seed: int) -> None:
-        self.line, self.random = line, random.Random(seed)
-        self.share, self.lost = 0.0, 0
-
-    def exchange(self, data: bytes, seconds: float) -> bytes:
-        """A period of the machine."""
-        if self.random.random() >= self.share:
-            return self.line.exchange(data, seconds)
-        self.lost += 1
-        self.line.exchange(self.random.choice((data, b"")), seconds)
-        return sealed(b"?")
-
-
-def index_home_wrong(homings: int = HOMINGS, seed: int = 1) -> float:
-    """The first homing has all packets; each further one must find the same counts for the same
-    place.
-    """
-    program = bench("homing_bench")
-    with TwinMachine(MILL, seed) as mill:
-        mill.gateway.line = losses = Losses(mill, seed)
-        scale = 1000 / MILL.configuration.axes[0].period_um
-        words = [mill.gateway.address[1], SESSION, mill.axes, scale, round(PERIOD_S * 1e9)]
-        process = subprocess.Popen(
-            [program, *map(str, words)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert process.stdin and process.stdout
-        wrong, first = 0, None
-        for _ in range(-(-homings // mill.axes) + 1):
-            if (answer := process.stdout.readline()) != "homed\n":
-                raise MoireError(f"the driver did not home: {answer.strip()}")
-            found = [mill.apart(n) for n in range(mill.axes)]
-            first = first or found
-            wrong += sum(one != other for one, other in zip(found, first, strict=True))
-            losses.share = LOST
-            process.stdin.write("\n")
-            process.stdin.flush()
-        process.kill()
-        process.wait()
-    console.print(f"{losses.lost} packets lost in {homings} homings, {wrong} counts wrong")
-    return wrong
 
 
 def thread_us_max(periods: int = PERIODS) -> float:
@@ -174,24 +107,6 @@ FIGURES = {
         "run by LinuxCNC",
         "<= 5",
         Quick({}, "the whole figure"),
-    ),
-    "linuxcnc_circle_um": Figure(
-        linuxcnc_circle_um,
-        "um",
-        "largest distance of the true path of the simulated S0 stage (motors alone, a perfect "
-        "scale) from a circle of 1 mm diameter at 1 mm/s run by LinuxCNC",
-        "<= 0.2",
-        Quick({}, "the whole figure"),
-        3,
-    ),
-    "index_home_wrong": Figure(
-        index_home_wrong,
-        "homings",
-        "of 10^4 homings to an index by the driver's index-enable, 1 % of packets lost, in "
-        "lockstep with the simulated mill: another count of the same place than without loss",
-        "0",
-        Quick({"homings": 3}, "3 homings"),
-        0,
     ),
     "thread_us_max": Figure(
         thread_us_max,

@@ -26,6 +26,8 @@ MODULES = Path("/usr/lib/linuxcnc/modules")
 RULES = Path("/usr/share/linuxcnc/Makefile.modinc")
 MESSAGES, USUAL_PORT = Path("/usr/share/linuxcnc/linuxcnc.nml"), 5005
 PRIVATE = Path("/mnt")  # everything of a run, in its own namespace
+# with processes of their own: the end of LinuxCNC ends all that have the names of its parts
+PRIVATELY = ("unshare", "--ipc", "--mount", "--pid", "--fork", "--mount-proc")
 PLAIN_USER = 65534  # nobody: LinuxCNC refuses to run as root
 LONGEST_S = 3600
 
@@ -41,7 +43,7 @@ def missing() -> str | None:
             return f"{what}: make linuxcnc"
     if os.geteuid() != 0:
         return "LinuxCNC gets namespaces of its own only from root"
-    private = subprocess.run(["unshare", "-i", "-m", "true"], capture_output=True)
+    private = subprocess.run([*PRIVATELY, "true"], capture_output=True)
     return None if private.returncode == 0 else "this computer gives no private namespaces"
 
 
@@ -122,7 +124,7 @@ def run(
             env -u DISPLAY HOME={PRIVATE}/home LANG=C linuxcnc -r {shlex.quote(ini.name)}
     """
     ran = subprocess.run(
-        ["unshare", "-i", "-m", "sh", "-c", script],
+        [*PRIVATELY, "sh", "-c", script],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

@@ -4,7 +4,6 @@ programmed path. Lengths in mm, in X, Y, Z.
 """
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -17,7 +16,7 @@ NEAR_MM, CLOSE_MM = 0.02, 0.005  # at a place: not gone yet, and come there
 # The last bit to the start is slow, so that the machine has settled when the program begins. A
 # dwell would be one of the computer's time, which is not that of a simulated machine.
 BEFORE_MM, SETTLING_FEED = 0.05, 20  # 0.15 s
-FIRST_LINE = 6
+DWELL, FIRST_LINE = "G4 P0.1", 7
 
 Points = NDArray[numpy.float64]  # n rows of X, Y, Z
 Point = tuple[float, float, float]
@@ -121,20 +120,21 @@ class Program:
         self.moves.append(Arc(self.place, (x, y), turn, rise))
         return self
 
-    def text(self, letters: str = "XYZ") -> str:
-        """The G-code for a machine of these axes; the first move is in line FIRST_LINE."""
+    def text(self) -> str:
+        """The G-code; the first move is in line FIRST_LINE."""
         x, y, z = self.start
         lines = [
             "G21 G90 G17 G91.1 G40 G49",
-            self.mode,
+            "G61",
             f"G0 X{x - BEFORE_MM:.6f} Y{y:.6f} Z{z:.6f}",
             f"G1 X{x:.6f} F{SETTLING_FEED}",
-            f"F{self.feed:g}",
+            DWELL,
+            f"{self.mode} F{self.feed:g}",
             *(move.code() for move in self.moves),
+            DWELL,
             "M2",
         ]
-        text = "\n".join(lines) + "\n"
-        return text if "Z" in letters else re.sub(" Z[-.0-9]+", "", text)
+        return "\n".join(lines) + "\n"
 
     def errors(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
         """Distances in mm of a path from the program while it was followed, and the path after
@@ -206,7 +206,6 @@ def moments(path: Sequence[Sequence[float]], periods_per_mm: float) -> Points:
     return found
 
 
-STAGE_PROGRAMS = {"circle": circle((1.5, 1.5), 0.5, 0, 60)}  # of S0
 PROGRAMS = {
     "circle": circle((15, 10), 5, 1, 600),
     "pocket": pocket((10, 10), 3, 1, 1, 900),

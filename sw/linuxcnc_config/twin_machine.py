@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Machines as twins in lockstep with LinuxCNC, RTL and firmware: each packet is a servo period of
 the machine's time. MILL is that of constraints/machines/mill_linuxcnc.toml: three steppers and 1 um
-scales. STAGE is that of S0, both axes in one node: interferometers and motors.
+scales.
 """
 
 import random
@@ -16,20 +16,20 @@ import numpy
 
 from experiments.s2_stage import CLK_HZ, Scale
 from experiments.s2_stage import NODE as STEPPERS
-from linuxcnc_config.generate import SERVO_MS, Configuration, Joint, load
+from linuxcnc_config.generate import Configuration, load
 from linuxcnc_config.programs import Points
 from linuxcnc_config.set_up import set_up
 from moire.bus.link_gateway import LinkGateway
 from moire.client.bus import Bus
 from moire.units import Value
 from twin import Twin, TwinTransport, build
-from twin.nodes.twin import ALL_AXES, NODE, Axis, Node
+from twin.nodes.twin import ALL_AXES, Axis, Node
 
 PERIOD_S = 4e-3  # a request and a reply of three axes take 2.7 ms of the slow clock of the twin
 DELAY_MS = 12.0  # until a set-point: two periods, the packet, and 4 ticks
 SESSION = 0x4D1
 PARTS = 8  # of a period, at whose ends the positions are recorded
-LSB, COUNTS = 1 << 16, 4  # of a position, and of a scale, in a signal period
+LSB = 1 << 16  # of a position, in a signal period
 SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
 
 
@@ -52,22 +52,6 @@ MILL = Plant(
     {**STEPPERS, "HAS_BACKLASH": ALL_AXES},
     {**SCALE.settings(), "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"},
     ("5um", "1mm/s", "0.25um"),
-)
-STAGE = Plant(
-    Configuration(
-        name="stage",
-        file="",
-        title="S0",
-        address=1,
-        bus="",
-        node="",
-        delay_ms=DELAY_MS,
-        period_ns=round(SERVO_MS * 1e6),
-        axes=[Joint(name, 0.8, -0.5, 100, 4, 50, 0, 0, 0) for name in "XY"],
-    ),
-    Axis("stage"),
-    "stream",
-    NODE,
 )
 
 
@@ -126,14 +110,6 @@ class TwinMachine:
             where = (self.twin.machine(n).state.position_m * 1e3 for n in range(self.axes))
             self.path.append(tuple(where))
         return self.line.take()
-
-    def apart(self, number: int) -> int:
-        """Counts of the node minus counts of the scale in the model, while the scale is at rest."""
-        while True:
-            scale = self.twin.truth(number).scale_counts
-            position = self.node.read_named("axis.position", number)["value"]
-            if scale == self.twin.truth(number).scale_counts:
-                return int(position * COUNTS // LSB - scale)
 
     def zero_mm(self, number: int) -> float:
         """The true position of the zero of an axis, which is a whole number of periods away from

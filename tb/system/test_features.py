@@ -40,11 +40,13 @@ MODULES = {  # of a feature, which are gone without it
     "filters": (),  # rows of the engine's memory
     "segments": ("segment_correction", "shift_delay"),
     "set_points": ("set_point_player", "set_point_queue", "set_point_axis", "set_point_piece"),
+    "backlash": ("backlash_compensation",),
 }
+OF_DRIVE = ("filters", "bridge", "stepper", "dac", "fine_stage", "set_points", "backlash")
 NEEDED_BY = {  # what goes with a feature
     "sine": ("monitor", "harmonics", "recorder"),
-    "velocity": ("drive", "filters", "bridge", "stepper", "dac", "fine_stage", "set_points"),
-    "drive": ("filters", "bridge", "stepper", "dac", "fine_stage", "set_points"),
+    "velocity": ("drive", *OF_DRIVE),
+    "drive": OF_DRIVE,
     "dac": ("fine_stage",),
 }
 FULL = {parameter_of(name): 1 for name in FEATURES} | {"FILTERS": 2, "SEGMENTS": 255}
