@@ -287,6 +287,7 @@ module node #(
     register_memory #(
         .AXES             (AXES),
         .FILTERS          (FILTERS == 0 ? 0 : HAS_FILTERS),
+        .HAS_BACKLASH     (HAS_BACKLASH),
         .HAS_BRIDGE       (HAS_BRIDGE),
         .HAS_COMPARE      (HAS_COMPARE),
         .HAS_DAC          (HAS_DAC),
