@@ -33,7 +33,7 @@ module register_memory #(
     parameter int HAS_HARMONICS     = 255,    // axes with harmonic correction
     parameter int HAS_MONITOR       = 255,    // axes with a signal monitor
     parameter int HAS_RECORDER      = 255,    // axes with a recorder
-    parameter int HAS_BACKLASH      = 255,    // axes that can follow set-points
+    parameter int HAS_BACKLASH      = 255,    // axes with compensation of backlash
     parameter int HAS_SET_POINTS    = 255,    // axes that can follow set-points
     parameter int HAS_SINE          = 255,    // axes with sine and cosine
     parameter int HAS_STEPPER       = 255,    // axes with a step generator
