@@ -34,6 +34,7 @@ module register_memory #(
     parameter int HAS_HARMONICS     = 255,    // axes with harmonic correction
     parameter int HAS_MONITOR       = 255,    // axes with a signal monitor
     parameter int HAS_RECORDER      = 255,    // axes with a recorder
+    parameter int HAS_BACKLASH      = 255,    // axes with compensation of backlash
     parameter int HAS_SET_POINTS    = 255,    // axes that can follow set-points
     parameter int HAS_SINE          = 255,    // axes with sine and cosine
     parameter int HAS_STEPPER       = 255,    // axes with a step generator
@@ -87,6 +88,7 @@ module register_memory #(
         .HAS_HARMONICS    (HAS_HARMONICS),
         .HAS_MONITOR      (HAS_MONITOR),
         .HAS_RECORDER     (HAS_RECORDER),
+        .HAS_BACKLASH     (HAS_BACKLASH),
         .HAS_SET_POINTS   (HAS_SET_POINTS),
         .HAS_SINE         (HAS_SINE),
         .HAS_STEPPER      (HAS_STEPPER),
@@ -164,6 +166,7 @@ module register_memory #(
             .HAS_HARMONICS    (HAS_HARMONICS),
             .HAS_MONITOR      (HAS_MONITOR),
             .HAS_RECORDER     (HAS_RECORDER),
+            .HAS_BACKLASH     (HAS_BACKLASH),
             .HAS_SET_POINTS   (HAS_SET_POINTS),
             .HAS_SINE         (HAS_SINE),
             .HAS_STEPPER      (HAS_STEPPER),
