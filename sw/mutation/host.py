@@ -10,20 +10,16 @@ mutant is equivalent to the module.
 """
 
 import argparse
-import ast
 import fnmatch
 import json
 import os
-import random
 import subprocess
 import sys
 import tempfile
 import tomllib
-from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 
 from mutation import record
@@ -126,16 +122,6 @@ def path_of(module: str) -> Path:
     return ROOT / "sw" / "host" / (module.replace(".", "/") + ".py")
 
 
-def annotations(source: str) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    """Where the types of a source stand, (line, column) from … to: they do nothing."""
-    for node in ast.walk(ast.parse(source)):
-        for name in ("annotation", "returns"):
-            kind = getattr(node, name, None)
-            if isinstance(kind, ast.expr):
-                assert kind.end_lineno is not None and kind.end_col_offset is not None
-                yield (kind.lineno, kind.col_offset), (kind.end_lineno, kind.end_col_offset)
-
-
 def difference(module: str, source: str, text: str) -> HostMutant:
     """The mutant that this text is."""
     old, new = source.splitlines(), text.splitlines()
@@ -146,41 +132,19 @@ def difference(module: str, source: str, text: str) -> HostMutant:
 
 def mutants_of(module: str, count: int, seed: int) -> list[HostMutant]:
     """So many mutants of a module, spread over the places of its source; fewer if it has fewer."""
-    if str(COSMIC_RAY) not in sys.path:
-        sys.path.append(str(COSMIC_RAY))
-    if not find_spec("cosmic_ray"):
+    if not (COSMIC_RAY / "cosmic_ray").exists():
         raise NotInstalled("Cosmic Ray is not installed: make cosmicray")
-    from cosmic_ray.ast import ast_nodes, get_ast  # only there after `make cosmicray`
-    from cosmic_ray.mutating import mutate_code
-    from cosmic_ray.plugins import get_operator, operator_names
-
+    made = subprocess.run(
+        [sys.executable, "-m", "mutation.host_texts", path_of(module), str(count), str(seed)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(COSMIC_RAY)])},
+        capture_output=True,
+        text=True,
+    )
+    if made.returncode:
+        why = made.stderr.strip().rpartition("\n")[2]
+        raise MutationError(f"{module}: Cosmic Ray makes no mutants: {why}")
     source = path_of(module).read_text()
-    tree, types = get_ast(source), list(annotations(source))
-    places: dict[tuple[int, int], list[tuple[str, int]]] = defaultdict(list)
-    for name in sorted(operator_names()):
-        operator = get_operator(name)
-        if operator.arguments():
-            continue
-        positions = [
-            begin for node in ast_nodes(tree) for begin, _ in operator().mutation_positions(node)
-        ]
-        for occurrence, begin in enumerate(positions):
-            if not any(low <= begin < high for low, high in types):
-                places[begin].append((name, occurrence))
-    draw = random.Random(f"{module} {seed}")
-    for choices in places.values():
-        draw.shuffle(choices)
-    order = [places[begin] for begin in draw.sample(sorted(places), len(places))]
-    found: dict[str, HostMutant] = {}
-    while order and len(found) < count:
-        choices = order.pop(0)
-        name, occurrence = choices.pop()
-        if choices:
-            order.append(choices)
-        text = mutate_code(source, get_operator(name)(), occurrence)
-        if text is not None and text != source:
-            found[text] = difference(module, source, text)
-    return list(found.values())
+    return [difference(module, source, text) for text in json.loads(made.stdout)]
 
 
 def runs(

@@ -20,7 +20,6 @@ import resource
 import signal
 import sys
 from collections.abc import Sequence
-from importlib.util import spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
 
@@ -60,8 +59,10 @@ class TextFinder(importlib.abc.MetaPathFinder):
         """The specification of the module; None for any other one."""
         if fullname != self.name:
             return None
-        loader = TextLoader(fullname, self.path, self.text)
-        return spec_from_file_location(fullname, self.path, loader=loader)
+        spec = importlib.machinery.PathFinder.find_spec(fullname, path, target)
+        assert spec
+        spec.loader = TextLoader(fullname, self.path, self.text)
+        return spec
 
 
 class FirstFailure:

@@ -287,8 +287,9 @@ S0 = "constraints/machines/s0.toml"
 
 def over_ethernet(folder, address="192.168.1.50", more=""):
     """The mill with its link over Ethernet."""
-    table = f'[node.ethernet]\naddress = "{address}"\n{more}\n[linuxcnc]'
-    return edited(folder, "constraints/machines/mill.toml", ("[linuxcnc]\nbus", f"{table}\nbus"))
+    node = "memory_kib = 64\naddress = 1\n"
+    table = f'[node.ethernet]\naddress = "{address}"\n{more}\n'
+    return edited(folder, "constraints/machines/mill.toml", (node, f"{node}\n{table}"))
 
 
 def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(tmp_path):
