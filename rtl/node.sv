@@ -298,7 +298,6 @@ module node #(
         .HAS_MONITOR      (HAS_MONITOR),
         .HAS_RECORDER     (HAS_RECORDER),
         .HAS_SET_POINTS   (HAS_SET_POINTS),
-        .HAS_BACKLASH     (HAS_BACKLASH),
         .HAS_SINE         (HAS_SINE),
         .HAS_STEPPER      (HAS_STEPPER),
         .HAS_VELOCITY     (HAS_VELOCITY),

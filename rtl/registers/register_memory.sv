@@ -24,7 +24,6 @@
 module register_memory #(
     parameter int AXES              = 1,      // axes of the node, 1 to 8
     parameter int FILTERS           = 255,    // bit n: axes with biquads of the servo
-    parameter int HAS_BACKLASH      = 255,    // axes with compensation of backlash
     parameter int HAS_BRIDGE        = 255,    // axes with a bridge
     parameter int HAS_COMPARE       = 255,    // axes with compare
     parameter int HAS_DAC           = 255,    // axes with a DAC
@@ -78,7 +77,6 @@ module register_memory #(
     register_layout #(
         .AXES             (AXES),
         .FILTERS          (FILTERS),
-        .HAS_BACKLASH     (HAS_BACKLASH),
         .HAS_BRIDGE       (HAS_BRIDGE),
         .HAS_COMPARE      (HAS_COMPARE),
         .HAS_DAC          (HAS_DAC),
@@ -156,7 +154,6 @@ module register_memory #(
         register_layout #(
             .AXES             (AXES),
             .FILTERS          (FILTERS),
-            .HAS_BACKLASH     (HAS_BACKLASH),
             .HAS_BRIDGE       (HAS_BRIDGE),
             .HAS_COMPARE      (HAS_COMPARE),
             .HAS_DAC          (HAS_DAC),
