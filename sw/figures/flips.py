@@ -54,7 +54,7 @@ NO_FLIP_FLOP = "no flip-flop"
 UNSAFE = ("wrong motion", "on without an answer", "lost")
 # What stops a drive: names of registers as the RTL has them, from the pins to the outputs
 PROTECTION = re.compile(
-    r"u_interlock\.|u_axis\.(?:faults|first_fault|fault_position|command|control_\w+)$|"
+    r"u_interlock\.|u_axis\.(?:first_fault|fault_position|command|control_\w+)$|axis_+faults$|"
     r"drive_enable$|g_drive\.passed$|encoder_fault_mask$|u_actuator\.|u_inputs\.|u_estop\.|"
     r"u_core_watchdog\.|u_rs485\.(?:u_watchdog\.|watchdog_time$|u_timeout\.)|core_trap$|"
     r"^watchdog_expired$|^heartbeat_kick$|^dac_\w+$|^bridge_\w+$|(?:^|__)step$|(?:^|__)direction$|"

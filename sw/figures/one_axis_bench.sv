@@ -52,6 +52,7 @@ module one_axis_bench (
     wire step_made, step_down, block_up, block_down, closed_loop, play, arm, controlled_stop;
     wire hold_target, result_valid, result_flag;
     wire [47:0] position, moved_by, result;
+    wire [23:0] take_up;
     wire line_start, line_idle, rate_valid, rate_restart, rate_steep, line_stopped;
     wire signed [36:0] rate;
     wire        [ 7:0] chain_setting_written;
@@ -107,6 +108,7 @@ module one_axis_bench (
         .moves,
         .moved,
         .moved_by,
+        .take_up,
         .block_up,
         .block_down,
         .closed_loop,
@@ -195,6 +197,7 @@ module one_axis_bench (
         .moves,
         .moved,
         .moved_by,
+        .take_up,
         .block_up,
         .block_down,
         .closed_loop,

@@ -47,6 +47,7 @@ module profile_bench #(
         .block_up              (1'b0),
         .block_down            (1'b0),
         .closed_loop           (1'b1),
+        .take_up               (24'd0),
         .start,
         .arm                   (1'b0),
         .controlled_stop,

@@ -37,7 +37,8 @@ module three_axes_bench (
         wire block_up, block_down;
         wire closed_loop, play, arm, controlled_stop, hold_target, pending;
         wire [47:0] position, moved_by;
-        wire [7:0] chain_setting_written;
+        wire [23:0] take_up;
+        wire [ 7:0] chain_setting_written;
         wire chain_harmonic_enable, chain_learn, sample_valid;
         wire signed [7:0] sample_sin, sample_cos;
         wire signed [31:0] quadrature_count;
@@ -69,6 +70,7 @@ module three_axes_bench (
             .moves,
             .moved,
             .moved_by,
+            .take_up,
             .block_up,
             .block_down,
             .closed_loop,
@@ -152,7 +154,7 @@ module three_axes_bench (
         wire pins = &{1'b0, adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction};
         wire dac = &{1'b0, dac_cs_n, dac_sclk, dac_sdi, target, phase, fine_command, faults};
         wire engine = &{
-            1'b0, position, step_made, step_down, moves, moved, moved_by, block_up, block_down,
+            1'b0, position, step_made, step_down, moves, moved, moved_by, take_up, block_up, block_down,
             closed_loop, play, arm, controlled_stop, hold_target, pending
         };
         wire chain = &{

@@ -222,12 +222,17 @@ class Rest:
         while count != len(self.works):
             count = len(self.works)
             late = self.late()
+            # a variable of the function that is written word by word, and has no value before
+            written = self.needs(True) & set(self.design.locals) & self.state
             for unit in units:
                 effect = effect_of(self.program[n] for n in unit)
-                names = {array(name) for name in effect.needs | effect.changes}
-                if unit[0] not in self.works and (names & active or late & set(unit)):
+                changes = {array(name) for name in effect.changes}
+                names = {array(name) for name in effect.needs} | changes
+                if unit[0] not in self.works and (
+                    names & active or changes & written or late & set(unit)
+                ):
                     self.works |= set(unit)
-                    changes = {array(name) for name in effect.changes} - self.state
+                    changes -= self.state
                     active |= {name for name in changes if not self.is_bit(name)}
 
     def is_bit(self, name: str) -> bool:

@@ -121,7 +121,7 @@ def test_what_stops_the_drives_is_found_by_name(s3):
         "u_estop.stages",
         "u_rs485.watchdog_time",
         "u_core_watchdog.u_heartbeat.silent",
-        "g_axis[0].u_axis.faults",
+        "axis_faults",
         "g_axis[0].u_axis.control_enable",
         "g_axis[0].u_axis.g_drive.u_interlock.too_far",
     }

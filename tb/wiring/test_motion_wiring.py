@@ -32,7 +32,7 @@ def test_the_node_reports_what_it_is(node):
 
 def test_each_axis_reports_what_it_is_built_with(node):
     full = dict.fromkeys(node.fields("axis.built"), 1) | {"filters": 2, "segments": 255}
-    full |= {"set_points": 0}
+    full |= {"set_points": 0, "backlash": 0}
     assert node.fields("axis.built", 0) == full
     assert node.fields("axis.built", 1) == full | {"capture": 0}
     assert node.fields("axis.built", 2) == dict.fromkeys(full, 0)

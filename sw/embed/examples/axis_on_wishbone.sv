@@ -85,6 +85,7 @@ module axis_on_wishbone #(
     wire closed_loop, play, arm, controlled_stop, hold_target, result_valid, result_flag;
     wire [2:0] result_axis, result_kind;
     wire [47:0] position, moved_by, result;
+    wire [23:0] take_up;
     wire [15:0] cycles;
     // lines of motor steps
     wire line_start, line_idle, rate_valid, rate_restart, rate_steep, line_stopped;
@@ -272,6 +273,7 @@ module axis_on_wishbone #(
         .moves,
         .moved,
         .moved_by,
+        .take_up,
         .block_up,
         .block_down,
         .closed_loop,
@@ -337,6 +339,7 @@ module axis_on_wishbone #(
         .moves,
         .moved,
         .moved_by,
+        .take_up,
         .block_up,
         .block_down,
         .closed_loop,
