@@ -171,8 +171,9 @@ def test_a_jog_that_is_held_goes_on_after_its_first_deadline(served, patient):
 
 
 def test_a_jog_ends_at_the_end_of_the_travel(served, patient):
-    served.node.set(0, travel_low=-10 << 16, travel_high=10 << 16)
     with served.stream() as client:
+        for name, value in (("travel_low", "-8 um"), ("travel_high", "8 um")):
+            client.request("PUT", f"{AXIS}/parameters/{name}", {"value": value})
         for by, end in (("1 m", 8000), ("-1 m", -8000)):
             client.request("POST", f"{AXIS}/jog", {"by": by})
             served.wait_until(lambda: served.node.ended() == "ok")
