@@ -154,8 +154,8 @@ module three_axes_bench (
         wire pins = &{1'b0, adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction};
         wire dac = &{1'b0, dac_cs_n, dac_sclk, dac_sdi, target, phase, fine_command, faults};
         wire engine = &{
-            1'b0, position, step_made, step_down, moves, moved, moved_by, take_up, block_up, block_down,
-            closed_loop, play, arm, controlled_stop, hold_target, pending
+            1'b0, position, step_made, step_down, moves, moved, moved_by, take_up, block_up,
+            block_down, closed_loop, play, arm, controlled_stop, hold_target, pending
         };
         wire chain = &{
             1'b0, chain_setting_written, chain_harmonic_enable, chain_learn, sample_valid,
