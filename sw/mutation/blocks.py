@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from mutation import equivalence, record
+from mutation import command, equivalence, record
 from mutation.block import BUILD, CellMutant, Fault, MutationError, Run, mutants_of
 from twin.build import ROOT, rtl_path
 
@@ -295,37 +295,22 @@ def entry_of(verdicts: Verdicts, count: int, seed: int) -> record.Entry:
     }
 
 
+def named(block: str, count: int, seed: int) -> Verdicts:
+    """As measured; an error begins with the name of the block."""
+    try:
+        return measured(block, count, seed)
+    except MutationError as error:
+        raise MutationError(f"{block}: {error}") from error
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m mutation.blocks")
-    parser.add_argument("blocks", nargs="*", help="modules below rtl/ with a test; default: all")
-    parser.add_argument("--list", action="store_true", help="print the blocks, run nothing")
-    parser.add_argument("--count", type=int, default=MUTANTS, help="mutants of each block")
-    parser.add_argument("--seed", type=int, default=1, help="which mutants, 1 and up")
-    parser.add_argument("--record", action="store_true", help="add the results to docs")
-    options = parser.parse_args(arguments)
-    if unknown := set(options.blocks) - set(tests()):
-        parser.error(f"{sorted(unknown)[0]} is no block that a test simulates by itself")
-    names = options.blocks or sorted(tests())
-    if options.list:
-        print(*names, sep="\n")
-        return 0
-    wrong = 0
-    for name in names:
-        try:
-            verdicts = measured(name, options.count, options.seed)
-        except MutationError as error:
-            print(f"{name}: {error}", file=sys.stderr, flush=True)
-            wrong += 1
-            continue
-        print(f"{name}: {verdicts.words}", flush=True)
-        for survivor in verdicts.survivors:
-            print(f"  {survivor.text}", flush=True)
-        for line in verdicts.stale:
-            print(f"  stale reason: {line}", flush=True)
-        wrong += len(verdicts.survivors) + len(verdicts.stale)
-        if options.record:
-            record.add(name, entry_of(verdicts, options.count, options.seed))
-    return int(wrong > 0)
+    parser.add_argument(
+        "names", nargs="*", metavar="BLOCK", help="modules below rtl/ with a test; default: all"
+    )
+    unknown = "is no block that a test simulates by itself"
+    measure = named
+    return command.run(parser, arguments, tests(), unknown, MUTANTS, measure, entry_of)
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from mutation import record
+from mutation import command, record
 from mutation.block import BUILD, MutationError
 from twin.build import ROOT
 
@@ -223,35 +223,12 @@ def entry_of(verdicts: Verdicts, count: int, seed: int) -> record.Entry:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m mutation.host")
-    parser.add_argument("modules", nargs="*", help="modules of host.toml; default: all")
-    parser.add_argument("--list", action="store_true", help="print the modules, run nothing")
-    parser.add_argument("--count", type=int, default=MUTANTS, help="mutants of each module")
-    parser.add_argument("--seed", type=int, default=1, help="which mutants, 1 and up")
-    parser.add_argument("--record", action="store_true", help="add the results to docs")
-    options = parser.parse_args(arguments)
-    if unknown := set(options.modules) - set(tests()):
-        parser.error(f"{sorted(unknown)[0]} has no tests in sw/mutation/host.toml")
-    names = options.modules or sorted(tests())
-    if options.list:
-        print(*names, sep="\n")
-        return 0
-    wrong = 0
-    for name in names:
-        try:
-            verdicts = measured(name, options.count, options.seed)
-        except MutationError as error:
-            print(error, file=sys.stderr, flush=True)
-            wrong += 1
-            continue
-        print(f"{name}: {verdicts.words}", flush=True)
-        for mutant in verdicts.survivors:
-            print(f"  {mutant.words}", flush=True)
-        for line in verdicts.stale:
-            print(f"  stale reason: {line}", flush=True)
-        wrong += len(verdicts.survivors) + len(verdicts.stale)
-        if options.record:
-            record.add(name, entry_of(verdicts, options.count, options.seed))
-    return int(wrong > 0)
+    parser.add_argument(
+        "names", nargs="*", metavar="MODULE", help="modules of host.toml; default: all"
+    )
+    unknown = "has no tests in sw/mutation/host.toml"
+    measure = measured
+    return command.run(parser, arguments, tests(), unknown, MUTANTS, measure, entry_of)
 
 
 if __name__ == "__main__":
