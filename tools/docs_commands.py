@@ -47,7 +47,7 @@ EXPERIMENT = re.compile(r"build/venv/bin/python -m experiments\.")
 RESOLVED_IN_SHORT = re.compile(
     r"make (demo|format|test K|prove K|tables|lint|promises|docs)"
 )  # unless the whole is asked for
-LONGEST_S = 4  # of an experiment, unless the whole is asked for
+LONGEST_S = 2  # of an experiment, unless the whole is asked for
 ENDLESS_S = 4  # of a command that only Ctrl-C ends
 PATIENCE_S = 600  # of every other command
 
