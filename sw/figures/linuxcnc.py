@@ -5,14 +5,22 @@ the driver. They need LinuxCNC: `make linuxcnc`.
 
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+import numpy
+
 from figures.common import Absent, Figure, Quick, console
 from linuxcnc_config.headless import RULES, SOURCES, missing, run
-from linuxcnc_config.programs import PROGRAMS
-from linuxcnc_config.twin_machine import MILL, TwinMachine
+from linuxcnc_config.programs import (
+    PROGRAMS,
+    SHORT_PROGRAMS,
+    STAGE_PROGRAMS,
+    TOUCHED,
+    Program,
+)
+from linuxcnc_config.twin_machine import MILL, STAGE, Plant, TwinMachine
 from moire.errors import MoireError
 from twin.build import ROOT
 
@@ -23,46 +31,68 @@ PERIODS = 100_000
 TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
 PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
 STILL_MM = 0.003  # a stepper that settles on its scale of 1 um
+TOUCH_MM = 0.002  # of a touched point from the surface
 BLEND_MM = {"corners": 0.05}  # tolerance of its G64
 
 
+MACHINES: dict[str, tuple[Plant, Mapping[str, Program]]] = {
+    "mill": (MILL, {**PROGRAMS, **SHORT_PROGRAMS}),
+    "stage": (STAGE, STAGE_PROGRAMS),
+}
+
+
 @cache
-def errors_mm(names: Sequence[str], seed: int) -> dict[str, float]:
-    """{program: largest distance of the true path from it} of programs of the mill; a program that
-    did not end is not in it.
+def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]:
+    """{program: largest distance of the true path from it} of programs of a machine; a program that
+    did not end is not in it. TOUCHED is the largest distance of touched points from the surface.
     """
     if reason := missing():
         raise Absent(reason)
     steps: list[list[str | float]] = [["patience", PATIENCE_S], ["on"], ["home"]]
     for name in names:
         steps += [["start", f"{name}.ngc"], ["finish"]]
-    texts = {f"{name}.ngc": PROGRAMS[name].text() for name in names}
-    with tempfile.TemporaryDirectory() as folder, TwinMachine(MILL, seed) as served:
+    plant, programs = MACHINES[machine]
+    letters = "".join(axis.name for axis in plant.configuration.axes)
+    texts = {f"{name}.ngc": programs[name].text(letters) for name in names}
+    found: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder, TwinMachine(plant, seed) as served:
         ran = run(served.configuration(), Path(folder), steps, texts)
         path = served.true_path()
+        if (touched := Path(folder) / TOUCHED).exists():
+            heights = served.above_mm(numpy.loadtxt(touched, ndmin=2)[:, :3])
+            found[TOUCHED] = float(abs(heights).max())
+            console.print(f"touched points: {1000 * found[TOUCHED]:.3f} um from the surface")
     if not ran.report:
         raise MoireError(f"LinuxCNC did not run: {ran.printed[-500:]}")
     ended = [row["done"] for row in ran.report if row["step"] == ["finish"]]
-    found: dict[str, float] = {}
     for name in [name for name, done in zip(names, ended) if done]:
-        distances, path = PROGRAMS[name].errors(path, STILL_MM)
+        distances, path = programs[name].errors(path, STILL_MM)
         found[name] = float(distances.max())
         console.print(f"{name}: largest distance from the path {1000 * found[name]:.3f} um")
     return found
 
 
 def linuxcnc_programs_failed(names: Sequence[str] = tuple(PROGRAMS), seed: int = 1) -> float:
-    found = errors_mm(tuple(names), seed)
-    return sum(
+    found = errors_mm("mill", tuple(names), seed)
+    missed = "surface" in names and found.get(TOUCHED, TOLERANCE_MM) > TOUCH_MM
+    return missed + sum(
         name not in found or found[name] > TOLERANCE_MM + BLEND_MM.get(name, 0) for name in names
     )
 
 
 def linuxcnc_mill_um(names: Sequence[str] = ("circle",), seed: int = 1) -> float:
-    found = errors_mm(tuple(names), seed)
+    return largest_um("mill", names, seed)
+
+
+def linuxcnc_circle_um(names: Sequence[str] = ("circle",), seed: int = 1) -> float:
+    return largest_um("stage", names, seed)
+
+
+def largest_um(machine: str, names: Sequence[str], seed: int) -> float:
+    found = errors_mm(machine, tuple(names), seed)
     if missed := set(names) - found.keys():
         raise MoireError(f"{', '.join(missed)} did not end")
-    return 1000 * max(found.values())
+    return 1000 * max(found[name] for name in names)
 
 
 def bench(name: str) -> Path:

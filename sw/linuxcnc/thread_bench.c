@@ -55,7 +55,7 @@ static uint32_t register_of(uint32_t address) {
     case NODE_BASE + NODE_BUILD: return (uint32_t)axes[0] << NODE_BUILD_AXES_SHIFT;
     case NODE_BASE + NODE_CLK_HZ: return CLK_HZ;
     case NODE_BASE + NODE_TICK_PERIOD: return TICK;
-    default: return AXIS_BUILT_SET_POINTS_MASK;
+    default: return AXIS_BUILT_DRIVE_MASK | AXIS_BUILT_SET_POINTS_MASK;
     }
 }
 
