@@ -269,8 +269,11 @@ def moments(path: Sequence[Sequence[float]], periods_per_mm: float) -> Points:
     return found
 
 
-SURFACE = Surface((0.4, 0.05), -9)  # below where the axes home
-STAGE_PROGRAMS = {"circle": circle((1.5, 1.5), 0.5, 0, 60)}  # of S0
+SURFACE = Surface((0.37, 0.053), -8.4)  # below where the axes home
+STAGE_PROGRAMS = {  # of S0; the arc begins and ends 30 degrees from a reversal of Y
+    "circle": circle((1.5, 1.5), 0.5, 0, 60),
+    "arc": Program((1.25, 1.5 + 0.25 * 3**0.5, 0), 60).arc(1.5, 1.5, -math.pi / 3),
+}
 PROGRAMS = {
     "circle": circle((15, 10), 5, 1, 600),
     "pocket": pocket((10, 10), 3, 1, 1, 900),

@@ -109,7 +109,8 @@ struct TouchProbe {
     double offset;
     bool touches(const std::vector<std::unique_ptr<Machine>>& machines, uint64_t now) const {
         double height = -offset;
-        for (size_t n = 0; n < AXES; n++) height += slopes[n] * machines[n]->position(now);
+        for (size_t n = 0; n < AXES; n++)
+            if (slopes[n] != 0) height += slopes[n] * machines[n]->position(now);
         return height < 0;
     }
     static constexpr unsigned pins() {
