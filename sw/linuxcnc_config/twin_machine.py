@@ -23,7 +23,7 @@ from linuxcnc_config.set_up import set_up
 from moire.analysis.tune import COEFFICIENT, notch
 from moire.bus.link_gateway import LinkGateway
 from moire.client.bus import Bus
-from moire.client.parameters import FILTER
+from moire.client.values import FILTER
 from moire.units import Value
 from twin import Twin, TwinTransport, build
 from twin.nodes.twin import ALL_AXES, NODE, Axis, Node
@@ -36,9 +36,9 @@ TICK_S = 0.25e-3  # of the servo
 LSB = 1 << 16  # of a position, in a signal period
 SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
 START_M = {"travel_start_lowest": 0.5e-3, "travel_start_highest": 1.5e-3}  # a short way to home
-# The friction of the stage disturbs the path where an axis reverses. `moire tune` finds the resonance
-# of S0 at 553 Hz; with a notch there, a phase margin of 45 degrees and a gain margin of 2.6 are left
-# for gains that are half as stiff again, at 15 Hz, as those of the parameters.
+# The friction of the stage disturbs the path where an axis reverses. `moire tune` finds the
+# resonance of S0 at 553 Hz; with a notch there, a phase margin of 45 degrees and a gain margin of
+# 2.6 are left for gains that are half as stiff again, at 15 Hz, as those of the parameters.
 STAGE_SERVO: dict[str, Value] = {
     "kp": 0.03,
     "ki": 0.0015,
