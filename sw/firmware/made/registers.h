@@ -878,6 +878,10 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_STATE_FINE_SATURATED_MASK 0x00002000u
 #define AXIS_STATE_FINE_SATURATED_SHIFT 13
 #define AXIS_STATE_FINE_SATURATED_WIDTH 1
+// HAS_CAPTURE: levels of the touch probes, 0 and 1
+#define AXIS_STATE_PROBE_MASK 0x0000c000u
+#define AXIS_STATE_PROBE_SHIFT 14
+#define AXIS_STATE_PROBE_WIDTH 2
 // r: latched faults
 #define AXIS_FAULTS 0x00cu
 #define AXIS_FAULTS_LIMIT_LOW_MASK 0x00000001u

@@ -1033,6 +1033,12 @@ FIELDS = (
         "fine stage at its limit",
     ),
     Field(
+        "axis", "state", "probe",
+        0x08, 14, 2, False, "r", "",
+        Fraction(1, 1),
+        "HAS_CAPTURE: levels of the touch probes, 0 and 1",
+    ),
+    Field(
         "axis", "faults", "limit_low",
         0x0C, 0, 1, False, "r", "",
         Fraction(1, 1),
