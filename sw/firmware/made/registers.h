@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xf56afb1cu  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xa49b4ceau  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
