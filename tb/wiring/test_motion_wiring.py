@@ -21,7 +21,7 @@ def play(node, axis, velocity, ticks):
 
 def test_the_node_reports_what_it_is(node):
     build = node.fields("node.build")
-    assert build == {"axes": 3, "address": 5, "memory": 4, "scope": 0}
+    assert build == {"axes": 3, "address": 5, "memory": 4, "scope": 1}
     assert node.read("node.clk_hz") == CLK_HZ
     first = node.now, node.read("node.time_stamp")
     node.run(1000)
