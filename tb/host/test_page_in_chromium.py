@@ -515,9 +515,6 @@ def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(se
             [name, *(written(v, *how) for v in (values[a], values[b], values[b] - values[a]))]
             for name, (values, *how) in expected.items()
         ]
-    page.evaluate("document.querySelector('header').style.position = 'static'")
-    scope.screenshot(path=SCOPE_PICTURE)
-    page.evaluate("document.querySelector('header').style.position = ''")
     scope.get_by_label("Cursor A").focus()
     page.keyboard.press("ArrowRight")
     see(page, "#scope tbody", written(time_ms[65], 3, "ms"))
@@ -573,6 +570,9 @@ def test_a_record_of_ticks_is_triggered_by_any_signal_and_has_what_came_before(t
     assert page.evaluate(NOT_DRAWN, ["Position", time_ms, places]) == []
     see(page, "#scope figcaption", "Axis 1 error in µm over ms")
     see(page, "#scope figcaption", "Integral in % over ms")
+    page.evaluate("document.querySelector('header').style.position = 'static'")
+    scope.screenshot(path=SCOPE_PICTURE)
+    page.evaluate("document.querySelector('header').style.position = ''")
     with page.expect_download() as download:
         scope.get_by_role("button", name="Export CSV").click()
     assert download.value.path().read_text() == record["csv"]

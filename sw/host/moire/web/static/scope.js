@@ -397,7 +397,8 @@ export class ScopePanel {
         `${lines[largest].toFixed(signal.digits)} ${signal.unit} at ${xs[largest].toFixed(2)} Hz.`;
     } else {
       this.cursors = [this.record.before, xs.length - 1];
-      this.note.textContent = "Time 0 is the trigger. Error is target − position.";
+      const zero = this.streams ? "first sample" : "trigger";
+      this.note.textContent = `Time 0 is the ${zero}. Error is target − position.`;
     }
     for (const slider of this.sliders) slider.max = xs.length - 1;
     this.draw();
