@@ -18,7 +18,7 @@ FIRMWARE := build/firmware/firmware.hex
 LITEX    := build/litex/stamp
 GOWIN    := build/gowin/stamp
 DOCS     := build/docs_tools/stamp
-COSMIC   := build/cosmic_ray/stamp
+MUTATORS := build/mutators/stamp
 LOADER_STAMP := build/loader/stamp
 
 say = @printf '%s\n' '--- $(1)'
@@ -140,9 +140,9 @@ $(DOCS): tools/docs.lock | $(SETUP)
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
 	@touch $@
 
-cosmicray: $(COSMIC)   ## Cosmic Ray into build/cosmic_ray, for mutants of the host's modules; docs/mutation.md
+mutators: $(MUTATORS)   ## Cosmic Ray and libclang into build/mutators, for mutants of host and firmware; docs/mutation.md
 
-$(COSMIC): sw/mutation/cosmic_ray.lock | $(SETUP)
+$(MUTATORS): sw/mutation/mutators.lock | $(SETUP)
 	@rm -rf $(@D)
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps --target $(@D) -r $<
 	@touch $@
@@ -207,4 +207,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board load flash docs litex cosmicray sigrok gowin loader linuxcnc chromium ngspice spice clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board load flash docs litex mutators sigrok gowin loader linuxcnc chromium ngspice spice clean

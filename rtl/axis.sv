@@ -511,6 +511,7 @@ module axis #(
         .state_queue_free              (queue_free),
         .state_armed                   (armed),
         .state_fine_saturated          (fine_saturated),
+        .state_probe                   (HAS_CAPTURE != 0 ? probe_level : 2'd0),
         // what is built
         .built_sine                    (1'(HAS_SINE)),
         .built_monitor                 (1'(HAS_MONITOR)),

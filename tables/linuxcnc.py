@@ -20,7 +20,12 @@ PAGE = ROOT / "docs" / "linuxcnc.md"
 REGISTERS = ROOT / "sw" / "firmware" / "made" / "registers.h"
 TYPES = {"bit": "HAL_BIT", "float": "HAL_FLOAT", "s32": "HAL_S32", "u32": "HAL_U32"}
 DIRECTIONS = {"in": "HAL_IN", "out": "HAL_OUT", "io": "HAL_IO"}
-SCOPES = {"node": "moire.N.", "axis": "moire.N.axis.M."}
+SCOPES = {  # whose pins are listed, and how their names begin
+    "node": ("a node", "moire.N."),
+    "axis": ("an axis", "moire.N.axis.M."),
+    "encoder": ("an axis without a drive", "moire.N.encoder.M."),
+    "digin": ("a digital input", "moire.N.digin.M."),
+}
 
 Table = dict[str, Any]
 
@@ -61,11 +66,12 @@ def registers_header() -> str:
     return header("registers", "registers.rdl", [*lines, "", field])
 
 
-def width(name: str) -> int:
-    """Words of a register."""
+def shape(name: str) -> tuple[int, bool]:
+    """Words of a register, and whether each axis has one."""
     block, _, register = name.partition(".")
     found = next(one for one in registers.read() if one.name == block)
-    return 2 if next(r for r in found.registers if r.name == register).wide else 1
+    wide = next(r for r in found.registers if r.name == register).wide
+    return 2 if wide else 1, found.stride > 0
 
 
 def lists_header(table: Table) -> str:
@@ -76,13 +82,13 @@ def lists_header(table: Table) -> str:
     for name, names in table["list"].items():
         fixed = each = 0
         for register in names:
-            words = width(register)
+            words, of_axes = shape(register)
             place = f"{{.fixed = {fixed}, .each = {each}, .width = {words}}}"
             lines.append(
                 f"static const struct list_place {name[:-1].upper()}_"
                 f"{register.replace('.', '_').upper()} = {place};"
             )
-            if register.startswith("axis."):
+            if of_axes:
                 each += words
             else:
                 fixed += words
@@ -168,8 +174,7 @@ def pins_header(
 def page(table: Table, found: dict[int, tuple[str, str]]) -> str:
     """docs/linuxcnc.md with its tables."""
     lines = [""]
-    for scope, start in SCOPES.items():
-        what = "a node" if scope == "node" else "an axis"
+    for scope, (what, start) in SCOPES.items():
         lines += [
             f"Pins of {what}, `{start}NAME`:",
             "",

@@ -38,7 +38,7 @@ PROGRAMS = ROOT / "build" / "venv" / "bin"
 COMMAND = re.compile(r"(moire|make|export|pip|build/venv/bin/\w+)\b")
 HARDWARE = re.compile(r"/dev/ttyUSB0|COM3|socket://127\.0\.0\.1:2218")
 RESOLVED_ONLY = re.compile(
-    r"make (test$|check|figures|soak|board|litex|cosmicray|sigrok|gowin|chromium|ngspice|linuxcnc"
+    r"make (test$|check|figures|soak|board|litex|mutators|sigrok|gowin|chromium|ngspice|linuxcnc"
     r"|spice|load|flash|firmware BOARD)"
 )
 ENDLESS = re.compile(r"moire\b.* (watch|serve)\b|moire (watch|serve)\b")
@@ -47,7 +47,7 @@ EXPERIMENT = re.compile(r"build/venv/bin/python -m experiments\.")
 RESOLVED_IN_SHORT = re.compile(
     r"make (demo|format|test K|prove K|tables|lint|promises|docs)"
 )  # unless the whole is asked for
-LONGEST_S = 4  # of an experiment, unless the whole is asked for
+LONGEST_S = 2  # of an experiment, unless the whole is asked for
 ENDLESS_S = 4  # of a command that only Ctrl-C ends
 PATIENCE_S = 600  # of every other command
 

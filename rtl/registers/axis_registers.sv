@@ -52,6 +52,8 @@ module axis_registers #(
     input  wire         [ 4:0] state_queue_free,                // segments that can be queued
     input  wire                state_armed,                     // a profile waits for start_at
     input  wire                state_fine_saturated,            // fine stage at its limit
+    // HAS_CAPTURE: levels of the touch probes, 0 and 1
+    input  wire         [ 1:0] state_probe,
     input  wire         [12:0] faults,                          // levels: latched faults
     // causes present now, same bits as faults
     input  wire         [12:0] causes_now,
@@ -183,9 +185,9 @@ module axis_registers #(
     wire         put = select && write;
 
     // words read in the cycle before
-    assign rdata = ({32{get_state}} & {18'd0, state_fine_saturated, state_armed, state_queue_free,
-        state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
-        state_limit_low, state_enabled}) | ({32{get_faults}} & {19'd0, faults}) |
+    assign rdata = ({32{get_state}} & {16'd0, state_probe, state_fine_saturated, state_armed,
+        state_queue_free, state_saturated, state_moving, state_drive_fault, state_estop,
+        state_limit_high, state_limit_low, state_enabled}) | ({32{get_faults}} & {19'd0, faults}) |
         ({32{get_causes_now}} & {19'd0, causes_now}) | ({32{get_first_fault}} & {19'd0,
         first_fault}) | ({32{get_fault_position}} & fault_position[31:0]) |
         ({32{get_fault_position_high}} & {16'd0, fault_position_high}) | ({32{get_position}} &

@@ -3,66 +3,104 @@
 the driver. They need LinuxCNC: `make linuxcnc`.
 """
 
+import random
+import re
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy
+
 from figures.common import Absent, Figure, Quick, console
 from linuxcnc_config.headless import RULES, SOURCES, missing, run
-from linuxcnc_config.programs import PROGRAMS
-from linuxcnc_config.twin_machine import MILL, TwinMachine
+from linuxcnc_config.programs import (
+    PROGRAMS,
+    SHORT_PROGRAMS,
+    STAGE_PROGRAMS,
+    TOUCHED,
+    Program,
+)
+from linuxcnc_config.twin_machine import MILL, PERIOD_S, SESSION, STAGE, Plant, TwinMachine
+from moire.bus.cobs import sealed
 from moire.errors import MoireError
+from moire.units import Value
 from twin.build import ROOT
 
-PARTS = ("axis", "carrier", "node", "node_clock", "packet")
+PARTS = ("axis", "carrier", "encoder", "latch", "node", "node_clock", "packet", "probe")
 OPTIONS = ("-O2", "-std=gnu11", "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-Drealtime")
 MEDIAN_US = 10.0
 PERIODS = 100_000
+HOMINGS, LOST = 10**4, 0.01
+BELOW_M = {"travel_start_lowest": -1.5e-3, "travel_start_highest": -0.5e-3}  # the index
+UPWARD: Mapping[str, Value] = {"home_method": 34, "home_distance": "2mm"}
 TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
 PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
 STILL_MM = 0.003  # a stepper that settles on its scale of 1 um
+TOUCH_MM = 0.002  # of a touched point from the surface
 BLEND_MM = {"corners": 0.05}  # tolerance of its G64
 
 
+MACHINES: dict[str, tuple[Plant, Mapping[str, Program]]] = {
+    "mill": (MILL, {**PROGRAMS, **SHORT_PROGRAMS}),
+    "stage": (STAGE, STAGE_PROGRAMS),
+}
+
+
 @cache
-def errors_mm(names: Sequence[str], seed: int) -> dict[str, float]:
-    """{program: largest distance of the true path from it} of programs of the mill; a program that
-    did not end is not in it.
+def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]:
+    """{program: largest distance of the true path from it} of programs of a machine; a program that
+    did not end is not in it. TOUCHED is the largest distance of touched points from the surface.
     """
     if reason := missing():
         raise Absent(reason)
     steps: list[list[str | float]] = [["patience", PATIENCE_S], ["on"], ["home"]]
     for name in names:
         steps += [["start", f"{name}.ngc"], ["finish"]]
-    texts = {f"{name}.ngc": PROGRAMS[name].text() for name in names}
-    with tempfile.TemporaryDirectory() as folder, TwinMachine(MILL, seed) as served:
+    plant, programs = MACHINES[machine]
+    letters = "".join(axis.name for axis in plant.configuration.axes)
+    texts = {f"{name}.ngc": programs[name].text(letters) for name in names}
+    found: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder, TwinMachine(plant, seed) as served:
         ran = run(served.configuration(), Path(folder), steps, texts)
         path = served.true_path()
+        if (touched := Path(folder) / TOUCHED).exists():
+            heights = served.above_mm(numpy.loadtxt(touched, ndmin=2)[:, :3])
+            found[TOUCHED] = float(abs(heights).max())
+            console.print(f"touched points: {1000 * found[TOUCHED]:.3f} um from the surface")
     if not ran.report:
         raise MoireError(f"LinuxCNC did not run: {ran.printed[-500:]}")
     ended = [row["done"] for row in ran.report if row["step"] == ["finish"]]
-    found: dict[str, float] = {}
     for name in [name for name, done in zip(names, ended) if done]:
-        distances, path = PROGRAMS[name].errors(path, STILL_MM)
+        distances, path = programs[name].errors(path, STILL_MM)
         found[name] = float(distances.max())
         console.print(f"{name}: largest distance from the path {1000 * found[name]:.3f} um")
     return found
 
 
 def linuxcnc_programs_failed(names: Sequence[str] = tuple(PROGRAMS), seed: int = 1) -> float:
-    found = errors_mm(tuple(names), seed)
-    return sum(
+    found = errors_mm("mill", tuple(names), seed)
+    missed = "surface" in names and found.get(TOUCHED, TOLERANCE_MM) > TOUCH_MM
+    return missed + sum(
         name not in found or found[name] > TOLERANCE_MM + BLEND_MM.get(name, 0) for name in names
     )
 
 
 def linuxcnc_mill_um(names: Sequence[str] = ("circle",), seed: int = 1) -> float:
-    found = errors_mm(tuple(names), seed)
+    return largest_um("mill", names, seed)
+
+
+def linuxcnc_circle_um(names: Sequence[str] = ("circle",), seed: int = 1) -> float:
+    return largest_um("stage", names, seed)
+
+
+def largest_um(machine: str, names: Sequence[str], seed: int) -> float:
+    found = errors_mm(machine, tuple(names), seed)
     if missed := set(names) - found.keys():
         raise MoireError(f"{', '.join(missed)} did not end")
-    return 1000 * max(found.values())
+    return 1000 * max(found[name] for name in names)
 
 
 def bench(name: str) -> Path:
@@ -77,6 +115,63 @@ def bench(name: str) -> Path:
     command = ["gcc", *OPTIONS, *folders, *map(str, sources), "-o", str(program), *links]
     subprocess.run(command, check=True)
     return program
+
+
+class Losses:
+    """Loses packets of a line in lockstep, requests and replies alike: the driver gets one byte."""
+
+    def __init__(self, line: TwinMachine, seed: int) -> None:
+        self.line, self.random = line, random.Random(seed)
+        self.share, self.lost = 0.0, 0
+        self.counts: list[list[int]] = [[], []]  # of the scales, at the end of the last periods
+
+    def exchange(self, data: bytes, seconds: float) -> bytes:
+        """A period of the machine."""
+        loses = self.random.random() < self.share
+        self.lost += loses
+        reply = self.line.exchange(b"" if loses and self.random.random() < 0.5 else data, seconds)
+        axes = range(self.line.axes)
+        self.counts = [self.counts[1], [self.line.twin.truth(n).scale_counts for n in axes]]
+        return sealed(b"?") if loses else reply
+
+    def rests(self) -> bool:
+        """Whether no scale has moved in the last period."""
+        return self.counts[0] == self.counts[1]
+
+
+def index_home_wrong(homings: int = HOMINGS, seed: int = 1) -> float:
+    """The first homing has all packets; each further one must find the same counts for the same
+    position.
+    """
+    program = bench("homing_bench")
+    axis = replace(MILL.axis, parameters=MILL.axis.parameters | BELOW_M)
+    plant = replace(MILL, axis=axis, settings={**MILL.settings, **UPWARD}, surface=None)
+    with TwinMachine(plant, seed) as mill:
+        mill.gateway.line = losses = Losses(mill, seed)
+        scale = 1000 / MILL.configuration.axes[0].period_um
+        words = [mill.gateway.address[1], SESSION, mill.axes, scale, round(PERIOD_S * 1e9)]
+        command = [str(program), *map(str, words)]
+        pipe = subprocess.PIPE
+        with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as process:
+            assert process.stdin and process.stdout
+            wrong, first, left = 0, list[int](), 1 + -(-homings // mill.axes)
+            while left:
+                answer = process.stdout.readline()
+                if not re.fullmatch(r"-?\d+( -?\d+)*\n", answer):
+                    raise MoireError(f"the driver did not home: {answer.strip()}")
+                rests = losses.rests()
+                if rests:
+                    pairs = zip(map(int, answer.split()), losses.counts[1], strict=True)
+                    found = [counts - true for counts, true in pairs]
+                    first = first or found
+                    wrong += sum(one != other for one, other in zip(found, first, strict=True))
+                    losses.share, left = LOST, left - 1
+                if left:
+                    process.stdin.write("home\n" if rests else "again\n")
+                    process.stdin.flush()
+            process.stdin.close()
+    console.print(f"{losses.lost} packets lost in {homings} homings, {wrong} counts wrong")
+    return wrong
 
 
 def thread_us_max(periods: int = PERIODS) -> float:
@@ -94,10 +189,11 @@ FIGURES = {
         linuxcnc_programs_failed,
         "programs",
         "G-code that LinuxCNC runs on the simulated three-axis mill (RTL, firmware, steppers, 1 um "
-        "scales): circle, pocket, helix, blended corners: not ended, or further than 20 um from "
-        "their paths",
+        "scales): circle, pocket, helix, blended corners, a surface touched with G38: not ended, "
+        "or further than 20 um from their paths, or touched points further than 2 um from the "
+        "surface",
         "0",
-        Quick({"names": ("circle",)}, "the circle"),
+        Quick({"names": ("small",)}, "a circle of 1 mm radius"),
         0,
     ),
     "linuxcnc_mill_um": Figure(
@@ -106,7 +202,24 @@ FIGURES = {
         "largest distance of the true path of that mill from a circle of 5 mm radius at 600 mm/min "
         "run by LinuxCNC",
         "<= 5",
-        Quick({}, "the whole figure"),
+        Quick({"names": ("small",)}, "the same circle of 1 mm radius"),
+    ),
+    "linuxcnc_circle_um": Figure(
+        linuxcnc_circle_um,
+        "um",
+        "largest distance of the true path of the simulated S0 stage (motors alone, a perfect "
+        "scale) from a circle of 1 mm diameter at 1 mm/s run by LinuxCNC",
+        "<= 0.2",
+        Quick({"names": ("arc",)}, "an arc with one reversal"),
+    ),
+    "index_home_wrong": Figure(
+        index_home_wrong,
+        "homings",
+        "of 10^4 homings to an index by the driver's index-enable, 1 % of packets lost, in "
+        "lockstep with the simulated mill: another count of the same position than without loss",
+        "0",
+        Quick({"homings": 3}, "3 homings"),
+        0,
     ),
     "thread_us_max": Figure(
         thread_us_max,

@@ -6,9 +6,7 @@
 #include "made/registers.h"
 #include "node.h"
 
-static const double POSITION_LSB = 65536;    // per period
-static const double VELOCITY_LSB = 1 << 24;  // per period and tick
-static const double TICK_LSB = 65536;        // per period and tick, of the measured velocity
+static const double VELOCITY_LSB = 1 << 24;  // per period and tick, of a set-point
 static const double OFFSET_S = 0.05;         // in which an offset at the start falls to 1/e
 static const double PATIENCE_S = 3;          // for the firmware to do what it was asked for
 static const double UNSEEN_S = 1;            // a homing that is not seen meanwhile was a short one
@@ -16,13 +14,6 @@ static const unsigned WARM_UP = 3;           // periods until the commands are t
 
 enum { MODE_OFF, MODE_PREPARED, MODE_STREAMING, MODE_EXTRAPOLATING, MODE_ENDED };
 enum { ENDED_LATE = 3, ENDED_FAULT = 4 };
-
-static int64_t wide(uint32_t low, uint32_t high) { return (int64_t)((uint64_t)high << 32 | low); }
-
-static double scale_of(const struct axis* axis) {
-    double scale = *axis->pins.scale;
-    return scale == 0 ? 1 : scale;
-}
 
 static void enter(struct axis* axis, enum phase phase) {
     axis->phase = phase;
@@ -38,11 +29,9 @@ static void fail(struct axis* axis, uint32_t cause) {
 void axis_take(struct axis* axis, const uint32_t* words, unsigned axes, unsigned number,
                double tick_s) {
     struct axis_pins* pins = &axis->pins;
-    double scale = scale_of(axis);
-    const uint32_t* at_position = words + list_word(READ_AXIS_POSITION, axes, number);
-    const uint32_t* at_target = words + list_word(READ_AXIS_TARGET, axes, number);
-    int64_t position = wide(at_position[0], at_position[1]);
-    int64_t target = wide(at_target[0], at_target[1]);
+    double scale = scale_of(*pins->scale);
+    int64_t position = position_word(words, READ_AXIS_POSITION, axes, number);
+    int64_t target = position_word(words, READ_AXIS_TARGET, axes, number);
     uint32_t state = words[list_word(READ_AXIS_STATE, axes, number)];
     uint32_t stream = words[list_word(READ_AXIS_STREAM_STATE, axes, number)];
     uint32_t counts = words[list_word(READ_AXIS_STREAM_COUNTS, axes, number)];
@@ -56,8 +45,8 @@ void axis_take(struct axis* axis, const uint32_t* words, unsigned axes, unsigned
     axis->ended = FIELD_GET(stream, AXIS_STREAM_STATE_ENDED);
     axis->state = FIELD_GET(supervision, AXIS_SUPERVISION_STATE);
     *pins->position = (double)position / POSITION_LSB / scale;
-    *pins->rawcounts = (int32_t)(position >> 14);
-    *pins->velocity_fb = velocity / TICK_LSB / tick_s / scale;
+    *pins->rawcounts = (int32_t)(position >> COUNT_SHIFT);
+    *pins->velocity_fb = velocity / POSITION_LSB / tick_s / scale;
     *pins->f_error = error / POSITION_LSB / scale;
     *pins->enabled = FIELD_GET(state, AXIS_STATE_ENABLED);
     *pins->limit_low = FIELD_GET(state, AXIS_STATE_LIMIT_LOW);
@@ -172,6 +161,11 @@ void axis_decide(struct axis* axis, uint32_t cause, double period_s) {
     *pins->position_fb = echoed ? *pins->position_cmd : *pins->position;
 }
 
+void axis_show_edge(struct axis* axis, int64_t position) {
+    double at = (double)position / POSITION_LSB / scale_of(*axis->pins.scale);
+    *axis->pins.position_latch = *axis->pins.position_fb = at;
+}
+
 static int64_t rounded(double value, double most) {
     return (int64_t)llround(fmin(fmax(value, -most), most));
 }
@@ -187,7 +181,7 @@ struct axis_request axis_give(struct axis* axis, double period_s, double tick_s,
     struct motion at = motion_after(motion_through(axis->commands, period_s), shift_s);
     at.position += axis->offset;
     axis->offset -= axis->offset * period_s / OFFSET_S;
-    double scale = scale_of(axis);
+    double scale = scale_of(*axis->pins.scale);
     *axis->pins.velocity_cmd = phase == FOLLOWING ? at.velocity : 0;
     return (struct axis_request){
         .position = rounded(at.position * scale * POSITION_LSB, 0x1p47 - 1),

@@ -51,6 +51,10 @@ void axis_take(struct axis* axis, const uint32_t* words, unsigned axes, unsigned
 // it may. Sets the pins that answer LinuxCNC.
 void axis_decide(struct axis* axis, uint32_t cause, double period_s);
 
+// The touch probe has met an edge at `position` (2^-16 period): LinuxCNC sees that for a period.
+// After axis_decide.
+void axis_show_edge(struct axis* axis, int64_t position);
+
 // The part of the axis in the next request. The set-point is at the commanded position of the
 // period before, `shift_s` later.
 struct axis_request axis_give(struct axis* axis, double period_s, double tick_s, double shift_s);

@@ -17,7 +17,9 @@
 #include <string.h>
 
 #include "axis.h"
+#include "encoder.h"
 #include "node.h"
+#include "probe.h"
 
 MODULE_AUTHOR("the Moire project");
 MODULE_DESCRIPTION("nodes of Moire on a real-time link");
@@ -39,13 +41,19 @@ static const double NS = 1e-9, MS = 1e-3;
 static const int64_t SIMULATED_NS = 60000000000;  // longest wait for a simulated node
 static const int64_t CHECK_NS = 100000000;        // for a reply while the component is loaded
 enum { LEVEL_LOST = 2, LEVEL_GOOD = 1, LEVEL_LIMIT = 10 };
+enum { INPUTS = 2 };       // pins for touch probes of an axis
 enum { LEAST_TICKS = 2 };  // from one set-point to the next
 
 struct link {
     struct node node;
     struct node_clock clock;
     struct node_pins pins;
-    struct axis axis[MOST_AXES];
+    struct axis axis[MOST_AXES];        // those with a drive
+    struct encoder encoder[MOST_AXES];  // those without one
+    struct latch latch[MOST_AXES];      // of each axis of the node
+    struct digin_pins digin[INPUTS * MOST_AXES];
+    struct probe probe;
+    unsigned asked;      // whose latch the last request had an access for; MOST_AXES: none
     bool waiting;        // a request was sent
     bool was_reset;      // level of the pin `reset` in the last period
     bool started;        // the clock of the node is known
@@ -83,9 +91,29 @@ static void count_refused(struct link* link) {
     }
 }
 
-static void take_reply(struct link* link) {
+// The latches, before what depends on them.
+static void take_captures(struct link* link, const uint32_t* words) {
+    unsigned axes = link->node.axes;
+    for (unsigned n = 0; n < axes; n++)
+        latch_look(&link->latch[n], words[list_word(READ_FEEDBACK_CAPTURE_STATE, axes, n)]);
+    if (link->asked < axes)
+        latch_answer(&link->latch[link->asked], link->reply.spare,
+                     position_word(words, READ_AXIS_POSITION, axes, link->asked));
+}
+
+static void take_inputs(struct link* link, const uint32_t* words) {
+    for (unsigned n = 0; n < INPUTS * link->node.axes; n++) {
+        uint32_t state = words[list_word(READ_AXIS_STATE, link->node.axes, n / INPUTS)];
+        *link->digin[n].in = FIELD_GET(state, AXIS_STATE_PROBE) >> n % INPUTS & 1;
+        *link->digin[n].in_not = !*link->digin[n].in;
+    }
+}
+
+// The good reply; true if the touch probe has met an edge.
+static bool take_reply(struct link* link) {
     struct node_pins* pins = &link->pins;
     struct node* of = &link->node;
+    double tick_s = of->tick / of->clk_hz;
     node_take_time(of, &link->reply);
     *pins->latency = (double)(carrier_now() - of->sent_at) / (double)NS_PER_MS;
     count_refused(link);
@@ -94,11 +122,19 @@ static void take_reply(struct link* link) {
     node_clock_take(&link->clock, of->time, words[READ_NODE_TICK_COUNT.fixed]);
     *pins->lateness = link->clock.late / of->clk_hz / MS;
     *pins->drift = node_clock_drift(&link->clock);
-    for (unsigned n = 0; n < of->axes; n++)
-        axis_take(&link->axis[n], words, of->axes, n, of->tick / of->clk_hz);
+    take_captures(link, words);
+    take_inputs(link, words);
+    bool ready = of->probes;
+    for (unsigned n = 0; n < of->drives; n++) {
+        axis_take(&link->axis[n], words, of->axes, n, tick_s);
+        ready = ready && link->axis[n].phase == FOLLOWING;
+    }
+    for (unsigned n = of->drives; n < of->axes; n++)
+        encoder_take(&link->encoder[n - of->drives], &link->latch[n], words, of->axes, n, tick_s);
     uint32_t state = words[list_word(READ_AXIS_STATE, of->axes, 0)];
     *pins->estop = FIELD_GET(state, AXIS_STATE_ESTOP);
     link->started = true;
+    return probe_take(&link->probe, link->latch, of->drives, *link->digin[0].in, ready);
 }
 
 // A packet is lost or has come: io-error follows when too many are lost.
@@ -122,7 +158,9 @@ static void decide(struct link* link, double period_s) {
     bool in_touch = link->started && !*pins->io_error;
     uint32_t cause = !in_touch ? CAUSE_LINK_LOST : *pins->watchdog_has_bit ? CAUSE_WATCHDOG : 0;
     uint32_t denied = cause || *pins->enable ? cause : CAUSE_NOT_ALLOWED;
-    for (unsigned n = 0; n < link->node.axes; n++) {
+    for (unsigned n = link->node.drives; n < link->node.axes && cause; n++)
+        link->latch[n].phase = LATCH_OFF;  // the node may have forgotten it
+    for (unsigned n = 0; n < link->node.drives; n++) {
         struct axis* axis = &link->axis[n];
         bool before = *axis->pins.fault;
         axis_decide(axis, denied, period_s);
@@ -138,12 +176,25 @@ static void decide(struct link* link, double period_s) {
 
 static void read_node(void* arg, long period_ns) {
     struct link* link = arg;
+    bool edge = false;
     if (link->waiting) {
         bool good = receive(link);
-        if (good) take_reply(link);
+        if (good) edge = take_reply(link);
         count(link, good);
     }
     decide(link, (double)period_ns * NS);
+    for (unsigned n = 0; n < link->node.drives && edge; n++)
+        axis_show_edge(&link->axis[n], link->latch[n].position);
+    *link->pins.probe = link->probe.level;
+}
+
+// The access of the first latch that needs one.
+static struct spare_access next_access(struct link* link) {
+    struct spare_access access = {0, 0};
+    unsigned n = 0;
+    while (n < link->node.axes && !latch_asks(&link->latch[n], n, &access)) n++;
+    link->asked = n < link->node.axes ? n : MOST_AXES;
+    return access;
 }
 
 // Fills the write list: the axes, then the requests, the tick and the commit.
@@ -155,7 +206,7 @@ static void fill(struct link* link, double period_s) {
     double tick = floor(moment);
     double shift_s = (tick - moment) * tick_s;
     uint32_t requests = 0, commit = 0, *values = link->values;
-    for (unsigned n = 0; n < to->axes; n++) {
+    for (unsigned n = 0; n < to->drives; n++) {
         struct axis_request asks = axis_give(&link->axis[n], period_s, tick_s, shift_s);
         uint32_t* position = values + list_word(WRITE_AXIS_SET_POINT_POSITION, to->axes, n);
         position[0] = (uint32_t)asks.position;
@@ -185,11 +236,15 @@ static void write_node(void* arg, long period_ns) {
     node_clock_step(&link->clock);
     fill(link, period_s);
     uint32_t time = node_time(to);
-    size_t length = packet_request(&to->link, time, link->values, 0, 0, link->packet);
+    struct spare_access access = next_access(link);
+    size_t length =
+        packet_request(&to->link, time, link->values, access.spare, access.value, link->packet);
     to->sent_at = carrier_now();
     carrier_send(&to->carrier, link->packet, length);
     link->waiting = true;
 }
+
+#define COUNT_OF(array) (sizeof(array) / sizeof *(array))
 
 static int export_pins(const struct moire_pin* pins, size_t count, void* of, const char* start) {
     for (size_t n = 0; n < count; n++) {
@@ -204,12 +259,21 @@ static int export_pins(const struct moire_pin* pins, size_t count, void* of, con
 
 static int export_link(struct link* link, unsigned number) {
     char name[MOST_NAME];
+    unsigned drives = link->node.drives, axes = link->node.axes;
     rtapi_snprintf(name, sizeof name, "moire.%u", number);
-    int failed = export_pins(NODE_PINS, sizeof NODE_PINS / sizeof *NODE_PINS, &link->pins, name);
-    for (unsigned n = 0; n < link->node.axes && !failed; n++) {
+    int failed = export_pins(NODE_PINS, COUNT_OF(NODE_PINS), &link->pins, name);
+    for (unsigned n = 0; n < drives && !failed; n++) {
         rtapi_snprintf(name, sizeof name, "moire.%u.axis.%u", number, n);
-        failed =
-            export_pins(AXIS_PINS, sizeof AXIS_PINS / sizeof *AXIS_PINS, &link->axis[n].pins, name);
+        failed = export_pins(AXIS_PINS, COUNT_OF(AXIS_PINS), &link->axis[n].pins, name);
+    }
+    for (unsigned n = drives; n < axes && !failed; n++) {
+        struct encoder* encoder = &link->encoder[n - drives];
+        rtapi_snprintf(name, sizeof name, "moire.%u.encoder.%u", number, n);
+        failed = export_pins(ENCODER_PINS, COUNT_OF(ENCODER_PINS), &encoder->pins, name);
+    }
+    for (unsigned n = 0; n < INPUTS * axes && !failed; n++) {
+        rtapi_snprintf(name, sizeof name, "moire.%u.digin.%u", number, n);
+        failed = export_pins(DIGIN_PINS, COUNT_OF(DIGIN_PINS), &link->digin[n], name);
     }
     if (failed) return failed;
     *link->pins.packet_read_timeout = 0.2;

@@ -46,11 +46,18 @@ static bool check(struct node* node) {
                  FIELD_GET(build, NODE_BUILD_AXES), node->axes);
         return false;
     }
+    node->drives = 0;
+    node->probes = true;
     for (unsigned axis = 0; axis < node->axes; axis++) {
         uint32_t built;
         if (!read_register(node, AXIS_BASE + axis * AXIS_STRIDE + AXIS_BUILT, &built)) return false;
-        if (FIELD_GET(built, AXIS_BUILT_SET_POINTS)) continue;
-        snprintf(node->why, sizeof node->why, "axis %u of the node has no set-points", axis);
+        if (!FIELD_GET(built, AXIS_BUILT_DRIVE)) continue;
+        const char* why = NULL;
+        if (!FIELD_GET(built, AXIS_BUILT_SET_POINTS)) why = "has no set-points";
+        if (node->drives++ != axis) why = "has a drive, the one before it has none";
+        if (!FIELD_GET(built, AXIS_BUILT_CAPTURE)) node->probes = false;
+        if (!why) continue;
+        snprintf(node->why, sizeof node->why, "axis %u of the node %s", axis, why);
         return false;
     }
     if (!read_register(node, NODE_BASE + NODE_CLK_HZ, &clock)) return false;

@@ -13,11 +13,15 @@
 #include "packet.h"
 
 enum { MOST_AXES = 8 };
+enum { COUNT_SHIFT = 14 };                 // from 2^-16 period to quarter periods
+static const double POSITION_LSB = 65536;  // per period; per period and tick of a velocity
 
 struct node {
     struct carrier carrier;
     struct link_session link;
     unsigned axes;
+    unsigned drives;  // axes with a drive; they come first, the others are encoders
+    bool probes;      // all axes with a drive capture edges of a touch probe
     double clk_hz;
     double tick;       // cycles of a servo tick
     uint32_t time;     // in the last reply, cycles
@@ -37,6 +41,16 @@ bool node_open(struct node* node, const char* where, unsigned axes, uint32_t ses
 static inline unsigned list_word(struct list_place place, unsigned axes, unsigned axis) {
     return place.fixed + axes * place.each + axis * place.width;
 }
+
+// A wide register in the values of a reply.
+static inline int64_t position_word(const uint32_t* words, struct list_place place, unsigned axes,
+                                    unsigned axis) {
+    const uint32_t* at = words + list_word(place, axes, axis);
+    return (int64_t)((uint64_t)at[1] << 32 | at[0]);
+}
+
+// A pin `scale`, periods per unit; 1 as long as it is 0.
+static inline double scale_of(double scale) { return scale == 0 ? 1 : scale; }
 
 // Takes the time of the node from the reply to the last request.
 void node_take_time(struct node* node, const struct link_reply* reply);

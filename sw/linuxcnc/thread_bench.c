@@ -4,48 +4,15 @@
 //
 //     thread_bench PERIODS AXES        prints the median and the largest time of read + write,
 //     us
+#include "bench_hal.h"
+
 #include <pthread.h>
-#include <stdarg.h>
-#include <stdlib.h>
 #include <arpa/inet.h>
 #include <poll.h>
 #include <sys/mman.h>
 #include <zlib.h>
 
 #include "moire.c"
-
-static void (*functions[2])(void*, long);
-static void* arguments[2];
-static int exported;
-
-int hal_init(const char* name) { return name ? 1 : -1; }
-int hal_ready(int id) { return id - 1; }
-int hal_exit(int id) { return id - 1; }
-void* hal_malloc(long size) { return calloc(1, (size_t)size); }
-int hal_pin_new(const char* name, hal_type_t type, hal_pin_dir_t direction, void** pointer,
-                int id) {
-    *pointer = calloc(1, 8);
-    return !(name && type && direction && id == 1);
-}
-int hal_export_funct(const char* name, void (*function)(void*, long), void* argument, int floats,
-                     int reentrant, int id) {
-    functions[exported] = function;
-    arguments[exported++] = argument;
-    return !(name && floats && !reentrant && id == 1);
-}
-void rtapi_print_msg(msg_level_t level, const char* format, ...) {
-    va_list list;
-    va_start(list, format);
-    if (level <= RTAPI_MSG_ERR) vfprintf(stderr, format, list);
-    va_end(list);
-}
-int rtapi_snprintf(char* text, unsigned long size, const char* format, ...) {
-    va_list list;
-    va_start(list, format);
-    int length = vsnprintf(text, size, format, list);
-    va_end(list);
-    return length;
-}
 
 enum { CLK_HZ = 60000000, TICK = 15000, STREAMING = 2, SERVO_NS = 1000000, WARM = 100 };
 
@@ -55,7 +22,7 @@ static uint32_t register_of(uint32_t address) {
     case NODE_BASE + NODE_BUILD: return (uint32_t)axes[0] << NODE_BUILD_AXES_SHIFT;
     case NODE_BASE + NODE_CLK_HZ: return CLK_HZ;
     case NODE_BASE + NODE_TICK_PERIOD: return TICK;
-    default: return AXIS_BUILT_SET_POINTS_MASK;
+    default: return AXIS_BUILT_DRIVE_MASK | AXIS_BUILT_SET_POINTS_MASK;
     }
 }
 

@@ -51,6 +51,14 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Spindle:
+    """An axis without a drive, the encoder of the spindle."""
+
+    name: str
+    periods_per_turn: float
+
+
+@dataclass(frozen=True)
 class Configuration:
     """What a configuration of LinuxCNC is made from."""
 
@@ -63,6 +71,8 @@ class Configuration:
     delay_ms: float  # of a set-point
     period_ns: int
     axes: list[Joint]
+    spindle: Spindle | None = None  # the axis of the node after the joints
+    probe: bool = False  # whether the axes capture edges of a touch probe
     session: int = 0  # of the link; 0: one is drawn for each configuration that is made
     simulated: bool = False
     display: str = "axis"
@@ -128,6 +138,16 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     )
 
 
+def spindle_of(row: Table) -> Spindle:
+    """The table [axis.linuxcnc] of an axis without a drive."""
+    table = row.table("linuxcnc", True)
+    periods = table.take("periods_per_turn", float)
+    if not periods > 0:
+        raise table.misfit(f"periods_per_turn {periods:g} must be above 0")
+    table.close()
+    return Spindle(row.take("name", str), periods)
+
+
 def load(name: str) -> Configuration:
     """The configuration of a machine; Misfit, one line, if its file does not describe one."""
     machine = machines.named(name)
@@ -144,7 +164,12 @@ def load(name: str) -> Configuration:
         raise table.misfit(f"delay_ms {delay:g}: a set-point needs {LEAST_DELAY_MS:g} at least")
     table.close()
     behind = delay + 2 * SERVO_MS
-    joints = [joint_of(row, number, behind) for number, row in enumerate(file.rows("axis"))]
+    rows = file.rows("axis")
+    driven = [row for row in rows if row.left.get("drives")]
+    joints = [joint_of(row, number, behind) for number, row in enumerate(driven)]
+    others = [spindle_of(row) for row in rows if row not in driven]
+    if driven != rows[: len(driven)] or len(others) > 1:
+        raise file.misfit("LinuxCNC needs the axes with a drive first, then one spindle at most")
     period = round(SERVO_MS * 1e6)
     return Configuration(
         machine.name,
@@ -156,6 +181,8 @@ def load(name: str) -> Configuration:
         delay,
         period,
         joints,
+        spindle=others[0] if others else None,
+        probe=all("capture" in row.left.get("features", []) for row in driven),
     )
 
 
@@ -172,6 +199,7 @@ def texts(found: Configuration) -> dict[str, str]:
         **{key: getattr(found, key) for key in Configuration.__dataclass_fields__},
         "session": found.session or random.SystemRandom().randint(1, LONGEST_SESSION),
         "behind_ms": found.behind_ms,
+        "node_axes": len(found.axes) + (found.spindle is not None),
         "letters": "".join(axis.name for axis in found.axes),
         "velocity": max(axis.velocity for axis in found.axes),
         "screen": found.display == "axis",

@@ -14,6 +14,7 @@ READS = (
     "axis.stream_state",
     "axis.stream_counts",
     "axis.supervision",
+    "feedback.capture_state",
 )
 WRITES = (
     "axis.set_point_position",

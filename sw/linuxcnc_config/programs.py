@@ -4,6 +4,7 @@ programmed path. Lengths in mm, in X, Y, Z.
 """
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -16,7 +17,9 @@ NEAR_MM, CLOSE_MM = 0.02, 0.005  # at a place: not gone yet, and come there
 # The last bit to the start is slow, so that the machine has settled when the program begins. A
 # dwell would be one of the computer's time, which is not that of a simulated machine.
 BEFORE_MM, SETTLING_FEED = 0.05, 20  # 0.15 s
-DWELL, FIRST_LINE = "G4 P0.1", 7
+TOUCHED = "touched.txt"  # rows of the positions of all axes
+PAST_MM = 0.2  # below a surface, where a touch ends at the latest
+DWELL, FIRST_LINE = "G4 P0.1", 8
 
 Points = NDArray[numpy.float64]  # n rows of X, Y, Z
 Point = tuple[float, float, float]
@@ -96,6 +99,26 @@ class Arc:
         return best
 
 
+@dataclass(frozen=True)
+class Touch(Line):
+    """A straight move until the touch probe touches."""
+
+    def code(self) -> str:
+        """The line of G-code."""
+        return super().code().replace("G1", "G38.2")
+
+
+@dataclass(frozen=True)
+class Thread(Line):
+    """A straight move with the spindle, `pitch` mm for each turn."""
+
+    pitch: float = 1.0
+
+    def code(self) -> str:
+        """The line of G-code."""
+        return f"{super().code().replace('G1', 'G33')} K{self.pitch:g}"
+
+
 @dataclass
 class Program:
     """A program from a start: each method adds a move."""
@@ -103,6 +126,7 @@ class Program:
     start: Point
     feed: float  # mm/min
     mode: str = "G61"  # of the path: exact, or G64 P… with a tolerance
+    setting: str = ""  # a line before the moves
     moves: list[Line | Arc] = field(default_factory=list)
 
     @property
@@ -120,8 +144,18 @@ class Program:
         self.moves.append(Arc(self.place, (x, y), turn, rise))
         return self
 
-    def text(self) -> str:
-        """The G-code; the first move is in line FIRST_LINE."""
+    def touch(self, x: float, y: float, z: float) -> "Program":
+        """A straight move until the touch probe touches, before its end."""
+        self.moves.append(Touch(self.place, (x, y, z)))
+        return self
+
+    def thread(self, x: float, y: float, z: float, pitch: float) -> "Program":
+        """A straight move with the spindle."""
+        self.moves.append(Thread(self.place, (x, y, z), pitch=pitch))
+        return self
+
+    def text(self, letters: str = "XYZ") -> str:
+        """The G-code for a machine of these axes; the first move is in line FIRST_LINE."""
         x, y, z = self.start
         lines = [
             "G21 G90 G17 G91.1 G40 G49",
@@ -129,12 +163,14 @@ class Program:
             f"G0 X{x - BEFORE_MM:.6f} Y{y:.6f} Z{z:.6f}",
             f"G1 X{x:.6f} F{SETTLING_FEED}",
             DWELL,
+            self.setting,
             f"{self.mode} F{self.feed:g}",
             *(move.code() for move in self.moves),
             DWELL,
             "M2",
         ]
-        return "\n".join(lines) + "\n"
+        text = "\n".join(lines) + "\n"
+        return text if "Z" in letters else re.sub(" Z[-.0-9]+", "", text)
 
     def errors(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
         """Distances in mm of a path from the program while it was followed, and the path after
@@ -200,15 +236,52 @@ def corners(start: Point, size: float, tolerance: float, feed: float) -> Program
     return found
 
 
+@dataclass(frozen=True)
+class Surface:
+    """A plane that a touch probe touches from above: Z = height + slopes * (X, Y)."""
+
+    slopes: tuple[float, float]
+    height: float
+
+    def above(self, point: Sequence[float]) -> float:
+        """How far a point is above it, along Z."""
+        x, y, z = point
+        return z - self.height - self.slopes[0] * x - self.slopes[1] * y
+
+    def program(self, places: Sequence[tuple[float, float]], high: float, feed: float) -> Program:
+        """Touches it at places of X and Y, from Z = high; LinuxCNC writes the points to TOUCHED."""
+        found = Program((*places[0], high), feed, setting=f"(PROBEOPEN {TOUCHED})")
+        for x, y in places:
+            low = high - self.above((x, y, high)) - PAST_MM
+            found.to(x, y, high, rapid=True).touch(x, y, low).to(x, y, high, rapid=True)
+        return found
+
+
+def threaded(start: Point, z: float, pitch: float, turns_s: float) -> Program:
+    """A thread cut with the spindle, which runs already."""
+    found = Program(start, 60 * pitch * turns_s, setting=f"S{60 * turns_s:g} M3")
+    return found.thread(*start[:2], z, pitch)
+
+
 def moments(path: Sequence[Sequence[float]], periods_per_mm: float) -> Points:
     """Rows of (time, positions in periods) as points in mm."""
     found: Points = numpy.array(path)[:, 1:] / periods_per_mm
     return found
 
 
+SURFACE = Surface((0.37, 0.053), -8.4)  # below where the axes home
+STAGE_PROGRAMS = {  # of S0; the arc begins and ends 30 degrees from a reversal of Y
+    "circle": circle((1.5, 1.5), 0.5, 0, 60),
+    "arc": Program((1.25, 1.5 + 0.25 * 3**0.5, 0), 60).arc(1.5, 1.5, -math.pi / 3),
+}
 PROGRAMS = {
     "circle": circle((15, 10), 5, 1, 600),
     "pocket": pocket((10, 10), 3, 1, 1, 900),
     "helix": helix((12, 12), 2, 3, 4, 600),
     "corners": corners((5, 5, 2), 2, 0.05, 900),
+    "surface": SURFACE.program([(24, 4), (26, 4), (25, 6)], 3, 120),
+}
+# short ones, near the zero
+SHORT_PROGRAMS = {
+    "small": circle((1.5, 1.5), 1, 0.5, 600),
 }

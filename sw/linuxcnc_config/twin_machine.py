@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Machines as twins in lockstep with LinuxCNC, RTL and firmware: each packet is a servo period of
-the machine's time. MILL is that of constraints/machines/mill_linuxcnc.toml: three steppers and 1 um
-scales.
+the machine's time. MILL is that of constraints/machines/mill_linuxcnc.toml: three steppers, 1 um
+scales, and a touch probe over SURFACE. STAGE is that of S0, both axes in one node: interferometers
+and motors.
 """
 
 import random
@@ -16,21 +17,35 @@ import numpy
 
 from experiments.s2_stage import CLK_HZ, Scale
 from experiments.s2_stage import NODE as STEPPERS
-from linuxcnc_config.generate import Configuration, load
-from linuxcnc_config.programs import Points
+from linuxcnc_config.generate import SERVO_MS, Configuration, Joint, load
+from linuxcnc_config.programs import REST, SURFACE, Points, Surface
 from linuxcnc_config.set_up import set_up
+from moire.analysis.tune import COEFFICIENT, notch
 from moire.bus.link_gateway import LinkGateway
 from moire.client.bus import Bus
+from moire.client.values import FILTER
 from moire.units import Value
 from twin import Twin, TwinTransport, build
-from twin.nodes.twin import ALL_AXES, Axis, Node
+from twin.nodes.twin import ALL_AXES, NODE, Axis, Node
 
 PERIOD_S = 4e-3  # a request and a reply of three axes take 2.7 ms of the slow clock of the twin
 DELAY_MS = 12.0  # until a set-point: two periods, the packet, and 4 ticks
 SESSION = 0x4D1
 PARTS = 8  # of a period, at whose ends the positions are recorded
+TICK_S = 0.25e-3  # of the servo
 LSB = 1 << 16  # of a position, in a signal period
 SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
+START_M = {"travel_start_lowest": 0.5e-3, "travel_start_highest": 1.5e-3}  # a short way to home
+# The friction of the stage disturbs the path where an axis reverses. `moire tune` finds the
+# resonance of S0 at 553 Hz; with a notch there, a phase margin of 45 degrees and a gain margin of
+# 2.6 are left for gains that are half as stiff again, at 15 Hz, as those of the parameters.
+STAGE_SERVO: dict[str, Value] = {
+    "kp": 0.03,
+    "ki": 0.0015,
+    "kd": 0.35,
+    **{f"filter_1_{n}": c / COEFFICIENT for n, c in zip(FILTER, notch(553, TICK_S), strict=True)},
+    "filters": "first",
+}
 
 
 @dataclass(frozen=True)
@@ -43,15 +58,34 @@ class Plant:
     parameters: Mapping[str, int]  # of rtl/node.sv
     settings: Mapping[str, Value] = field(default_factory=dict)  # parameters of each axis
     backlash: tuple[Value, Value, Value] | None = None  # as in Axis.set_backlash
+    surface: Surface | None = None  # under a touch probe, in mm from where the model has its zeros
 
 
 MILL = Plant(
     load("mill_linuxcnc"),
-    SCALE.machine(),
+    replace(SCALE.machine(), parameters=SCALE.machine().parameters | START_M),
     "steps_stream",
     {**STEPPERS, "HAS_BACKLASH": ALL_AXES},
     {**SCALE.settings(), "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"},
     ("5um", "1mm/s", "0.25um"),
+    SURFACE,
+)
+STAGE = Plant(
+    Configuration(
+        name="stage",
+        file="",
+        title="S0",
+        address=1,
+        bus="",
+        node="",
+        delay_ms=DELAY_MS,
+        period_ns=round(SERVO_MS * 1e6),
+        axes=[Joint(name, 0.8, -0.5, 100, 4, 50, 0, 0, 0) for name in "XY"],
+    ),
+    Axis("stage"),
+    "stream",
+    {**NODE, "FILTERS": 2},
+    STAGE_SERVO,
 )
 
 
@@ -68,6 +102,10 @@ class TwinMachine:
             firmware=build.firmware(plant.image, self.axes),
             node_parameters=parameters,
         )
+        if surface := plant.surface:  # Z - slopes * (X, Y) is below its height
+            slopes = [-slope for slope in surface.slopes]
+            height_mm = surface.height + self.model_zero_mm * (1 - sum(surface.slopes))
+            self.twin.fit_probe([*slopes, 1.0], height_mm * 1e-3)
         bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed))
         self.twin.run_until_ready()
         for number in range(self.axes):
@@ -111,20 +149,35 @@ class TwinMachine:
             self.path.append(tuple(where))
         return self.line.take()
 
+    @property
+    def model_zero_mm(self) -> float:
+        """The true position at which the model has the index of an axis."""
+        return self.plant.axis.parameters.get("scale_index_position", 0.0) * 1e3
+
+    def above_mm(self, points: Points) -> Points:
+        """How far points, in mm from the zeros, are truly above the surface, along Z."""
+        surface = self.plant.surface
+        assert surface
+        shift = [self.zero_mm(n) - self.model_zero_mm for n in range(self.axes)]
+        return numpy.array([surface.above(point + shift) for point in points])
+
     def zero_mm(self, number: int) -> float:
         """The true position of the zero of an axis, which is a whole number of periods away from
         where the model has a zero.
         """
         period = self.plant.configuration.axes[number].period_um * 1e-3
-        model = self.plant.axis.parameters.get("scale_index_position", 0.0) * 1e3
         count = self.node.read_named("axis.position", number)["value"]
-        apart = self.twin.machine(number).state.position_m * 1e3 - count / LSB * period - model
-        return float(model + round(apart / period) * period)
+        apart = self.twin.machine(number).state.position_m * 1e3 - count / LSB * period
+        apart -= self.model_zero_mm
+        return float(self.model_zero_mm + round(apart / period) * period)
 
     def true_path(self) -> Points:
         """Rows of X, Y, Z in mm, true positions of the tables, from the zeros; Z is 0 without an
-        axis. After the end of LinuxCNC.
+        axis. After the end of LinuxCNC, which may have seen the end for some periods only: it rests
+        on without packets.
         """
+        for _ in range(REST // PARTS):
+            self.exchange(b"", PERIOD_S)
         found: Points = numpy.zeros((len(self.path), 3))
         found[:, : self.axes] = self.path
         found[:, : self.axes] -= [self.zero_mm(n) for n in range(self.axes)]

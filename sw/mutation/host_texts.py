@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Prints texts of mutants of a Python source, as a list in JSON, for mutation.host.
 
-PYTHONPATH=build/cosmic_ray python -m mutation.host_texts FILE COUNT SEED
+PYTHONPATH=build/mutators python -m mutation.host_texts FILE COUNT SEED
 """
 
 import ast
@@ -15,6 +15,8 @@ from pathlib import Path
 from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
+
+from mutation.sources import drawn
 
 Place = tuple[int, int]  # line, column
 
@@ -48,16 +50,10 @@ def faults(source: str) -> dict[Place, list[tuple[str, int]]]:
 
 def texts(source: str, count: int, draw: random.Random) -> list[str]:
     """So many texts with one fault each: first one at each place, then further ones."""
-    places = faults(source)
-    order = [places[begin] for begin in draw.sample(sorted(places), len(places))]
-    for choices in order:
-        draw.shuffle(choices)
     found: dict[str, None] = {}
-    while order and len(found) < count:
-        choices = order.pop(0)
-        name, occurrence = choices.pop()
-        if choices:
-            order.append(choices)
+    for name, occurrence in drawn(faults(source), draw):
+        if len(found) == count:
+            break
         text = mutate_code(source, get_operator(name)(), occurrence)
         if text is not None and text != source:
             found[text] = None

@@ -350,7 +350,7 @@ async def what_breaks_a_rule_is_refused_counted_and_changes_nothing(dut):
 
 @cocotb.test()
 async def every_end_of_a_stream_leaves_an_empty_queue(dut):
-    needs(int(dut.AXES.value) < 8, "one axis is enough")
+    needs(int(dut.AXES.value) == 1, "one axis is enough")
     player = await Player(dut).reset()
     a, engine = player.model.axes[0], player.engines[0]
     for why in ("release", "withdrawn", "stops", "drive", "underrun"):

@@ -14,7 +14,7 @@ from twin.compiled.host_library import host_library
 ZLIB = Path("/usr/include/zlib.h")
 LONGEST = 4 * layout.LONGEST_WORDS
 OPTIONS = ["-std=gnu11", "-D_GNU_SOURCE", "-Wl,--no-as-needed", "-lz", "-lm"]
-NAMES = ("packet", "carrier", "node_clock")
+NAMES = ("packet", "carrier", "node", "node_clock", "latch", "probe")
 
 
 class Session(ctypes.Structure):
@@ -51,6 +51,32 @@ class Motion(ctypes.Structure):
     _fields_ = [(name, ctypes.c_double) for name in ("position", "velocity", "acceleration")]
 
 
+class Latch(ctypes.Structure):
+    """struct latch"""
+
+    _fields_ = [
+        ("phase", ctypes.c_int),
+        ("sources", ctypes.c_uint32),
+        ("position", ctypes.c_int64),
+    ]
+
+
+class Access(ctypes.Structure):
+    """struct spare_access"""
+
+    _fields_ = [(name, ctypes.c_uint32) for name in ("spare", "value")]
+
+
+class Probe(ctypes.Structure):
+    """struct probe"""
+
+    _fields_ = [
+        ("phase", ctypes.c_int),
+        *((name, ctypes.c_bool) for name in ("level", "pin")),
+        *((name, ctypes.c_uint) for name in ("steady", "waiting")),
+    ]
+
+
 class Carrier(ctypes.Structure):
     """struct carrier"""
 
@@ -59,6 +85,21 @@ class Carrier(ctypes.Structure):
         ("serial", ctypes.c_bool),
         ("received", ctypes.c_size_t),
         ("stuffed", ctypes.c_uint8 * (LONGEST + 16)),
+    ]
+
+
+class Node(ctypes.Structure):
+    """struct node"""
+
+    _fields_ = [
+        ("carrier", Carrier),
+        ("link", Session),
+        *((name, ctypes.c_uint) for name in ("axes", "drives")),
+        ("probes", ctypes.c_bool),
+        *((name, ctypes.c_double) for name in ("clk_hz", "tick")),
+        ("time", ctypes.c_uint32),
+        *((name, ctypes.c_int64) for name in ("time_at", "sent_at", "patience")),
+        ("why", ctypes.c_char * 160),
     ]
 
 
@@ -74,6 +115,7 @@ def driver() -> ctypes.CDLL:
     found.node_clock_tick.restype = ctypes.c_double
     found.node_clock_drift.restype = ctypes.c_double
     found.motion_through.restype = found.motion_after.restype = Motion
+    found.node_open.restype = found.latch_asks.restype = found.probe_take.restype = ctypes.c_bool
     found.carrier_open.restype = ctypes.c_char_p
     found.carrier_send.restype = ctypes.c_bool
     found.carrier_receive.restype = ctypes.c_size_t

@@ -33,6 +33,7 @@ NOT_ENDED, RELEASED, STOPPED, LATE, BY_FAULT = range(5)
 LOST = b"?"  # instead of a reply
 WATCHDOG_S = 0.05
 LATE_TICKS = 400  # longest extrapolation
+INDEX, RISING, FALLING = 1, 8, 32  # sources of captures
 
 
 @cache
@@ -108,6 +109,10 @@ class IdealAxis:
     extrapolated: int = 0
     home_ticks: int = 0  # until homing ends
     velocity: float = 0.0
+    turn: float = 0.0  # an encoder without a drive: periods from index to index
+    spin: float = 0.0  # and periods per tick
+    sources: int = 0  # of captures
+    captured: list[float] = field(default_factory=list)
 
     def fault(self, name: str) -> None:
         """Latches a fault: the drive goes off."""
@@ -154,9 +159,17 @@ class IdealAxis:
             self.mode = STREAMING
             self.queue.append(point)
 
+    def capture(self, source: int, position: float) -> None:
+        """An event at a position."""
+        if self.sources & source:
+            self.captured.append(position)
+
     def run(self, tick: int) -> None:
         """A servo tick."""
         before = self.position
+        self.position += self.spin
+        if self.turn and self.position // self.turn != before // self.turn:
+            self.capture(INDEX, self.position // self.turn * self.turn)
         if self.state == STATE["homing"]:
             self.home_ticks -= 1
             self.position -= self.position / max(1, self.home_ticks)
@@ -178,11 +191,24 @@ class IdealAxis:
         self.velocity = self.position - before
 
 
-class IdealNode:
-    """A node with `axes` ideal axes and its link."""
+CLEARS = placed("feedback", "strobes", capture_clear=1, arm_index=1)
 
-    def __init__(self, axes: int, map_crc: int = MAP_CRC) -> None:
-        self.axes = [IdealAxis() for _ in range(axes)]
+
+class IdealNode:
+    """A node with `axes` ideal axes and its link. `spindle` is an encoder after them. `above` is
+    the height of the tip of a touch probe over a surface, in periods, by the positions of the axes:
+    it is linear within a tick.
+    """
+
+    def __init__(
+        self,
+        axes: int,
+        map_crc: int = MAP_CRC,
+        spindle: IdealAxis | None = None,
+        above: Callable[[Sequence[float]], float] = lambda positions: 1.0,
+    ) -> None:
+        self.axes = [IdealAxis() for _ in range(axes)] + ([spindle] if spindle else [])
+        self.drives, self.above, self.height = axes, above, 1.0
         self.map_crc = map_crc
         self.time = 0  # cycles
         self.tick = 0
@@ -208,16 +234,25 @@ class IdealNode:
         names[address("node", "tick_count")] = lambda: self.tick % WORD
         for n, axis in enumerate(self.axes):
 
-            def wide(register: str, value: Callable[[], float], n: int = n) -> None:
-                low = address("axis", register, n)
+            def wide(
+                register: str, value: Callable[[], float], n: int = n, block: str = "axis"
+            ) -> None:
+                low = address(block, register, n)
                 names[low] = lambda: round(value() * POSITION_LSB) % WORD
                 names[low + 4] = lambda: round(value() * POSITION_LSB) >> 32 & WORD - 1
 
             wide("position", lambda axis=axis: axis.position)
             wide("target", lambda axis=axis: axis.position)
-            names[address("axis", "built", n)] = lambda: placed("axis", "built", set_points=1)
+            wide("captured_position", lambda axis=axis: axis.captured[0], block="feedback")
+            drive = n < self.drives
+            names[address("axis", "built", n)] = lambda drive=drive: placed(
+                "axis", "built", set_points=drive, drive=drive, capture=1
+            )
             names[address("axis", "state", n)] = lambda axis=axis: placed(
-                "axis", "state", enabled=axis.enabled, estop=self.estop
+                "axis", "state", enabled=axis.enabled, estop=self.estop, probe=self.height < 0
+            )
+            names[address("feedback", "capture_state", n)] = lambda axis=axis: placed(
+                "feedback", "capture_state", present=bool(axis.captured)
             )
             names[address("axis", "faults", n)] = lambda axis=axis: axis.faults
             names[address("axis", "first_fault", n)] = lambda axis=axis: axis.first_fault
@@ -252,6 +287,10 @@ class IdealNode:
                 axis.fresh.add("position")
             if at == address("axis", "set_point_velocity", n):
                 axis.fresh.add("velocity")
+            if at == address("feedback", "capture_sources", n):
+                axis.sources = value
+            if at == address("feedback", "strobes", n) and value == CLEARS:
+                axis.captured = []
         if at == address("node", "set_point_commit"):
             self._commit(value)
 
@@ -280,10 +319,21 @@ class IdealNode:
             if self.expired:
                 for axis in [axis for axis in self.axes if axis.enabled]:
                     axis.fault("bus_watchdog")
+            before = [axis.position for axis in self.axes]
             for axis in self.axes:
                 axis.run(self.tick)
+            self._touch(before)
             self.path.append((self.time / CLK_HZ, *(axis.position for axis in self.axes)))
         self.time = end
+
+    def _touch(self, before: Sequence[float]) -> None:
+        """Captures the positions of all axes where the probe meets the surface or leaves it."""
+        was, self.height = self.height, self.above([axis.position for axis in self.axes])
+        if (was < 0) != (self.height < 0):
+            share = was / (was - self.height)
+            for axis, start in zip(self.axes, before, strict=True):
+                at = start + share * (axis.position - start)
+                axis.capture(RISING if self.height < 0 else FALLING, at)
 
     def _asked(self, requests: int, n: int) -> dict[str, int]:
         return {
@@ -343,7 +393,7 @@ class IdealNode:
         self.words = {}
         self.refused = [0] * len(layout.CAUSES)
         for axis in self.axes:
-            axis.__init__(position=axis.position)
+            axis.__init__(position=axis.position, turn=axis.turn, spin=axis.spin)
 
     def _refuse(self, cause: str) -> None:
         names = [name for name, _ in layout.CAUSES]

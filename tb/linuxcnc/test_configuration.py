@@ -67,6 +67,48 @@ def test_the_backlash_of_a_machine_file_comes_to_the_set_up(tmp_path, monkeypatc
     axis().set_backlash.assert_called_once_with("2.5um", "8mm/s", "1um", True)
 
 
+SPINDLE = """
+[[axis]]
+name = "S"
+[axis.linuxcnc]
+periods_per_turn = 1024
+"""
+
+
+def test_an_axis_without_a_drive_is_the_encoder_of_the_spindle(tmp_path):
+    found = written(tmp_path)
+    assert "spindle" not in texts(load(found))["mill.hal"]
+    Path(found).write_text(Path(found).read_text() + SPINDLE)
+    hal = texts(load(found))["mill.hal"]
+    assert "--axes 2" in hal and "axes=2" in hal
+    assert "\nsetp moire.0.encoder.1.scale 1024\n" in hal
+    for pin, end in (("position", "revs"), ("velocity", "speed-in"), ("index", "index-enable")):
+        line = next(line for line in hal.splitlines() if line.startswith(f"net spindle-{pin} "))
+        assert "moire.0.encoder.1." in line and line.endswith(f" spindle.0.{end}")
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        (MILL + SPINDLE.replace("1024", "0"), "periods_per_turn 0 must be above 0"),
+        (MILL + SPINDLE + SPINDLE.replace("S", "T"), "then one spindle at most"),
+        (MILL.replace("[[axis]]", SPINDLE + "[[axis]]"), "needs the axes with a drive first"),
+    ],
+)
+def test_a_spindle_that_does_not_fit_is_refused_in_a_line(tmp_path, text, words):
+    path = tmp_path / "mill.toml"
+    path.write_text(text)
+    with pytest.raises(Misfit, match=words):
+        load(str(path))
+
+
+def test_the_touch_probe_comes_to_linuxcnc_if_all_axes_capture_its_edges(tmp_path):
+    line = "net probe moire.0.probe => motion.probe-input"
+    assert line not in texts(load(written(tmp_path)))["mill.hal"]
+    features = ('drives = ["stepper"]', 'drives = ["stepper"]\nfeatures = ["capture"]')
+    assert line in texts(load(written(tmp_path, features)))["mill.hal"]
+
+
 def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(tmp_path):
     found = load(written(tmp_path))
     sessions = [re.findall(r"session[ =](\d+)", texts(found)["mill.hal"]) for _ in range(3)]

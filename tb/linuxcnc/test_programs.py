@@ -1,22 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """LinuxCNC without a screen runs G-code through the driver, in lockstep with a node that has ideal
 axes. Skipped by name where LinuxCNC is not installed (`make linuxcnc`).
+
+A start of LinuxCNC takes seconds: all programs run in one of them, one after the other, and the
+tests look at their parts of the path.
 """
 
 import fcntl
+import math
 import os
 import pty
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy
 import pytest
 
 from linuxcnc_config import headless
-from linuxcnc_config.generate import load
-from linuxcnc_config.programs import FIRST_LINE, PROGRAMS, moments
+from linuxcnc_config.generate import Spindle, load
+from linuxcnc_config.programs import (
+    FIRST_LINE,
+    SURFACE,
+    TOUCHED,
+    circle,
+    corners,
+    helix,
+    moments,
+    pocket,
+    threaded,
+)
 from linuxcnc_config.set_up import set_up
-from tb.linuxcnc.ideal_node import CLK_HZ, STREAMING, TICK, IdealNode, Served
+from tb.linuxcnc.ideal_node import CLK_HZ, STREAMING, TICK, IdealAxis, IdealNode, Served
 
 SESSION = 0x4D01
 PERIODS_PER_MM = 250.0
@@ -24,9 +40,35 @@ TICK_S = TICK / CLK_HZ
 # where the acceleration of 500 mm/s2 steps: the velocity of a set-point, from its two neighbours at
 # 1 ms, differs by a quarter of the step, and the cubic by 4/27 of this over 1 ms; four in a row
 MOST_ERROR_MM = 4 * 500 * 1e-6 / 4 * 4 / 27
+PERIODS_PER_TURN, TURNS_S, PITCH_MM = 1024, 20, 0.5
+CATCH_UP = 200  # ticks
+LSB_MM = 1 / 65536 / PERIODS_PER_MM
+
+PROGRAMS = {
+    "circle": circle((5, 5), 2, 1, 600),
+    "pocket": pocket((3, 3), 2, 1, 1, 900),
+    "helix": helix((6, 6), 1, 2, 3, 600),
+    "corners": corners((3, 3, 2), 2, 0.05, 900),
+    "surface": SURFACE.program([(24, 4), (26, 6)], 3, 600),
+    "threaded": threaded((3, 3, 5), 2, PITCH_MM, TURNS_S),
+}
+# three passes, in the plane of a lathe
+LATHE = f"""G21 G90 G18 G40 G49 G61
+S{60 * TURNS_S} M3
+G0 X6 Y3 Z5
+G76 P{PITCH_MM} Z3 I-1 J0.2 K0.6 R1 Q0 H0 E0 L0
+M5
+M2
+"""
+HELD = circle((12, 16), 2, 1, 600)
+STOPPED = {  # what interrupts a circle
+    "estop": circle((6, 10), 1, 1, 600),
+    "cable": circle((6, 14), 1, 1, 600),
+    "power": circle((6, 18), 1, 1, 600),
+}
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="module")
 def needs_linuxcnc():
     if why := reason():
         pytest.skip(why)
@@ -39,115 +81,170 @@ def reason():
 
 
 def run(folder, served, steps, programs=None):
-    """LinuxCNC with the mill at a served node."""
-    set_up(served.node, len(served.node.axes), SESSION)
+    """LinuxCNC with the mill and a spindle at a served node."""
+    axes = len(served.node.axes)
+    set_up(served.node, axes, SESSION)
     node = f"udp:127.0.0.1:{served.port}"
+    spindle = Spindle("S", PERIODS_PER_TURN) if axes > 3 else None
     mill = replace(load("mill_linuxcnc"), bus="", node=node, session=SESSION, simulated=True)
-    texts = {f"{name}.ngc": program.text() for name, program in (programs or {}).items()}
-    return headless.run(mill, folder, steps, texts)
+    return headless.run(replace(mill, spindle=spindle), folder, steps, programs)
 
 
-def path_of(node):
-    return moments(node.path, PERIODS_PER_MM)
+def at_mm(node):
+    return [axis.position / PERIODS_PER_MM for axis in node.axes[:3]]
 
 
-def test_circle_pocket_helix_and_blended_corners_are_on_their_paths(tmp_path):
-    steps, marks = [["on"], ["home"]], {}
-    node = IdealNode(3)
-    for name in PROGRAMS:
-        steps += [["start", f"{name}.ngc"], ["finish"]]
-    with Served(node) as served:
-        ran = run(tmp_path, served, steps, PROGRAMS)
-    assert ran.done, ran.printed + str(ran.report)
-    path = path_of(node)
-    for name, program in PROGRAMS.items():
-        errors, path = program.errors(path)
-        marks[name] = errors.max()
-    print({name: f"{1000 * error:.4f} um" for name, error in marks.items()})
-    assert 0.01 < marks.pop("corners") <= 0.05
-    assert max(marks.values()) < MOST_ERROR_MM
-    for axis in node.axes:
-        assert (axis.late, axis.refused) == (0, 0) and axis.accepted > 3000
+def near(node, program):
+    """Whether the axes are within a circle, or on it."""
+    return math.dist(at_mm(node)[:2], program.moves[0].centre) < 1.1 * program.moves[0].radius
 
 
-def messages(ran):
-    """All error messages that LinuxCNC showed."""
-    return ran.report[-1]["messages"] if ran.report else []
+def cutting(node, program):
+    """Whether the axes are on a circle, a quarter after its start."""
+    (x, y, _), centre = at_mm(node), program.moves[0].centre
+    streams = node.axes[0].mode == STREAMING
+    return streams and near(node, program) and x > centre[0] and y > centre[1]
 
 
-def cutting(node):
-    """Whether the axes are on the circle, a quarter after its start."""
-    x, y, _ = (axis.position / PERIODS_PER_MM for axis in node.axes)
-    return node.axes[0].mode == STREAMING and x > 15 and y > 14
+def above(positions):
+    """The height of the probe over the surface, in periods."""
+    return SURFACE.above([p / PERIODS_PER_MM for p in positions[:3]]) * PERIODS_PER_MM
 
 
-def lost_for(periods):
-    """A condition that is true for some periods from the moment of cutting on, once."""
-    left = [periods]
+class Losses:
+    """The packets that are lost: four in a row of 25 at HELD, and 100 when the cable is pulled."""
 
-    def lose(node):
-        if left[0] == periods and not cutting(node):
+    def __init__(self):
+        self.pulled = 100
+
+    def __call__(self, node):
+        if near(node, HELD):
+            return node.tick % 100 < 4 * 4
+        if self.pulled == 100 and not cutting(node, STOPPED["cable"]):
             return False
-        left[0] -= left[0] > 0
-        return left[0] > 0
-
-    return lose
+        self.pulled -= self.pulled > 0
+        return self.pulled > 0
 
 
-CIRCLE = {"circle": PROGRAMS["circle"]}
-CUT = [["start", "circle.ngc"]]
-AGAIN = [["on"], *CUT, ["finish"]]
+class Day(NamedTuple):
+    """What has happened."""
+
+    node: IdealNode
+    ran: headless.Run
+    path: numpy.ndarray  # mm
+    folder: Path
+
+    def parts(self):
+        """{program: distances of its path from it} of PROGRAMS and HELD, and the path on HELD."""
+        found, path = {}, self.path
+        for name, program in [*PROGRAMS.items(), ("held", HELD)]:
+            found[name], after = program.errors(path)
+            ended = len(path) - len(after)
+            part, path = path[ended - len(found[name]) : ended], after
+        return found, part
+
+    def last(self, name):
+        """The distances of the last run of a circle: backwards it looks like forwards."""
+        path = self.path[::-1]
+        for other in reversed(STOPPED):
+            errors, path = STOPPED[other].errors(path)
+            if other == name:
+                return errors
+        raise KeyError(name)
+
+    def messages(self):
+        """All error messages that LinuxCNC showed."""
+        return self.ran.report[-1]["messages"]
 
 
-def last_circle(node):
-    """The errors of the last circle: backwards it looks like forwards."""
-    return CIRCLE["circle"].errors(path_of(node)[::-1])[0]
-
-
-def test_feed_override_hold_and_lost_packets_stay_on_the_circle(tmp_path):
-    node = IdealNode(3)
-    steps = [["on"], ["home"], *CUT, ["line", FIRST_LINE], ["override", 0.5]]
-    steps += [["pause"], ["resume"], ["override", 1.2], ["finish"]]
-    with Served(node, lose=lambda node: node.tick % 100 < 4) as served:
-        ran = run(tmp_path, served, steps, CIRCLE)
+@pytest.fixture(scope="module")
+def day(tmp_path_factory):
+    """All programs, and what interrupts them."""
+    spin = PERIODS_PER_TURN * TURNS_S * TICK_S
+    node = IdealNode(3, spindle=IdealAxis(turn=PERIODS_PER_TURN, spin=spin), above=above)
+    steps = [["on"], ["home"]]
+    for name in [*PROGRAMS, "lathe"]:
+        steps += [["start", f"{name}.ngc"], ["finish"]]
+    steps += [["start", "held.ngc"], ["line", FIRST_LINE], ["override", 0.5]]
+    steps += [["pause"], ["resume"], ["override", 1.2], ["finish"], ["override", 1.0]]
+    for name in STOPPED:
+        steps += [["start", f"{name}.ngc"], ["stopped"], ["on"]]
+        steps += [["home"]] * (name == "power") + [["start", f"{name}.ngc"], ["finish"]]
+    events = [
+        (partial(cutting, program=STOPPED["estop"]), IdealNode.press_estop),
+        (lambda node: node.stopped_for(0.2), lambda node: node.press_estop(False)),
+        (partial(cutting, program=STOPPED["power"]), IdealNode.restart),
+        (lambda node: node.unset_for(0.1), lambda node: set_up(node, 4, SESSION)),
+    ]
+    programs = {**PROGRAMS, **STOPPED, "held": HELD}
+    texts = {f"{name}.ngc": program.text() for name, program in programs.items()}
+    texts["lathe.ngc"] = LATHE
+    folder = tmp_path_factory.mktemp("day")
+    with Served(node, events, Losses()) as served:
+        ran = run(folder, served, steps, texts)
     assert ran.done, ran.printed + str(ran.report)
-    path = path_of(node)
-    errors, after = CIRCLE["circle"].errors(path)
-    assert errors.max() < MOST_ERROR_MM
-    on_circle = path[len(path) - len(after) - len(errors) :][200 : len(errors) - 400]
-    speeds = numpy.linalg.norm(numpy.diff(on_circle, axis=0), axis=1) / TICK_S
+    return Day(node, ran, moments(node.path, PERIODS_PER_MM)[:, :3], folder)
+
+
+def test_circle_pocket_helix_and_blended_corners_are_on_their_paths(day):
+    errors = {name: found.max() for name, found in day.parts()[0].items()}
+    print({name: f"{1000 * error:.4f} um" for name, error in errors.items()})
+    assert 0.01 < errors.pop("corners") <= 0.05
+    assert max(errors.values()) < MOST_ERROR_MM
+
+
+def test_the_points_that_g38_touches_are_on_the_surface(day):
+    points = numpy.loadtxt(day.folder / TOUCHED)[:, :3]
+    places = [move.end[:2] for move in PROGRAMS["surface"].moves[1::3]]
+    assert len(points) == len(places) and abs(points[:, :2] - places).max() < MOST_ERROR_MM
+    assert max(abs(SURFACE.above(point)) for point in points) < 3 * LSB_MM
+
+
+def thread_passes(day):
+    """Spindle turns, and Z in turns of the thread, of each pass: where Z moves with the spindle,
+    without the begin, in which it catches up, and the end.
+    """
+    turns = numpy.array(day.node.path)[:, 4] / PERIODS_PER_TURN
+    z = day.path[:, 2] / PITCH_MM
+    with_it = abs(numpy.diff(z) / TICK_S + TURNS_S) < 0.2 * TURNS_S
+    with_it &= abs(day.path[1:, 1] - PROGRAMS["threaded"].start[1]) < MOST_ERROR_MM
+    edges = numpy.flatnonzero(numpy.diff(numpy.r_[0, with_it, 0]))
+    passes = zip(edges[::2] + CATCH_UP, edges[1::2] - CATCH_UP)
+    return [(turns[a:b], z[a:b]) for a, b in passes if b > a]
+
+
+def test_g33_and_each_pass_of_g76_follow_the_spindle_in_the_same_groove(day):
+    passes = thread_passes(day)
+    assert len(passes) == 1 + 3
+    grooves = [turns + z for turns, z in passes]
+    within = max(numpy.ptp(groove) for groove in grooves)
+    starts = numpy.array([groove.mean() for groove in grooves])
+    apart = (starts - starts[0] + 0.5) % 1 - 0.5
+    print(f"a pass follows the spindle within {within:.5f} turns, passes {abs(apart).max():.5f}")
+    assert within < 1e-3 and abs(apart).max() < 1e-3
+
+
+def test_feed_override_hold_and_lost_packets_stay_on_the_circle(day):
+    errors, part = day.parts()
+    assert errors["held"].max() < MOST_ERROR_MM
+    speeds = numpy.linalg.norm(numpy.diff(part[200:-400], axis=0), axis=1) / TICK_S
     assert speeds.min() < 0.01 and 11.9 < speeds.max() < 12.1  # mm/s, held, and at 120 %
 
 
-def test_after_an_emergency_stop_of_the_node_linuxcnc_runs_again(tmp_path):
-    node = IdealNode(3)
-    events = [(cutting, IdealNode.press_estop)]
-    events.append((lambda node: node.stopped_for(0.2), lambda node: node.press_estop(False)))
-    with Served(node, events) as served:
-        ran = run(tmp_path, served, [["on"], ["home"], *CUT, ["stopped"], *AGAIN], CIRCLE)
-    assert ran.done, ran.printed + str(ran.report)
-    assert "moire: axis 0: emergency stop" in messages(ran)
-    assert last_circle(node).max() < MOST_ERROR_MM
+def test_after_an_emergency_stop_of_the_node_linuxcnc_runs_again(day):
+    assert "moire: axis 0: emergency stop" in day.messages()
+    assert day.last("estop").max() < MOST_ERROR_MM
 
 
-def test_after_the_cable_was_pulled_linuxcnc_runs_again_without_homing(tmp_path):
-    node = IdealNode(3)
-    with Served(node, lose=lost_for(100)) as served:
-        ran = run(tmp_path, served, [["on"], ["home"], *CUT, ["stopped"], *AGAIN], CIRCLE)
-    assert ran.done, ran.printed + str(ran.report)
-    assert "moire: packets were lost for too long" in messages(ran)
-    assert last_circle(node).max() < MOST_ERROR_MM
+def test_after_the_cable_was_pulled_linuxcnc_runs_again_without_homing(day):
+    assert "moire: packets were lost for too long" in day.messages()
+    assert day.last("cable").max() < MOST_ERROR_MM
 
 
-def test_a_node_whose_power_was_cut_is_set_up_and_homed_again(tmp_path):
-    node = IdealNode(3)
-    events = [(cutting, IdealNode.restart)]
-    events.append((lambda node: node.unset_for(0.1), lambda node: set_up(node, 3, SESSION)))
-    steps = [["on"], ["home"], *CUT, ["stopped"], ["on"], ["home"], *AGAIN]
-    with Served(node, events) as served:
-        ran = run(tmp_path, served, steps, CIRCLE)
-    assert ran.done, ran.printed + str(ran.report)
-    assert last_circle(node).max() < MOST_ERROR_MM
+def test_a_node_whose_power_was_cut_is_set_up_and_homed_again(day):
+    assert day.last("power").max() < MOST_ERROR_MM
+    for axis in day.node.axes[:3]:
+        assert (axis.late, axis.refused) == (0, 0) and axis.accepted > 500
 
 
 def test_a_node_of_another_build_is_refused_in_a_sentence(tmp_path):

@@ -117,3 +117,16 @@ def test_what_an_axis_lacks_is_refused_with_its_parameter(axes):
             axis.capture_now()
         with pytest.raises(Refused, match="it needs HAS_COMPARE of"):
             axis.compare_off()
+
+
+def test_a_touch_probe_over_a_surface_is_seen_by_an_axis_that_captures(axes):
+    node = axes[STEPPER].node
+    twin = node.bus.transport.twin
+    slopes, here_m = (1.0, 0.0, 0.0), twin.truth(STEPPER).position_m
+    for height_m, touches in ((1e-6, 0), (-1e-6, 1)):
+        twin.fit_probe(slopes, here_m - height_m)
+        twin.run(1e-4)
+        levels = [node.read_named("axis.state", axis)["probe"] for axis in range(3)]
+        assert levels == [0, touches, 0]
+    with pytest.raises(ValueError, match="2 slopes for a node of 3 axes"):
+        twin.fit_probe(slopes[:2], 0.0)

@@ -227,6 +227,16 @@ def test_each_source_captures_with_its_bit_position_and_time(node):
     assert node.read("feedback.capture_state", "present") == 0, "probes of the other axis"
 
 
+def test_the_state_of_an_axis_shows_the_levels_of_its_probes_if_they_capture(node):
+    node.start()
+    for levels in (0b01, 0b10, 0b00):
+        for bit in range(4):
+            node.set_bit("probe", bit, levels >> bit % 2 & 1)
+        node.run(20)
+        assert node.read("axis.state", "probe", axis=0) == levels
+        assert node.read("axis.state", "probe", axis=1) == 0, "it has no queue of captures"
+
+
 def test_captures_queue_in_order_and_overrun_is_reported(node):
     node.start()
     node.write("feedback.capture_sources", 4)

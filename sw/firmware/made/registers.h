@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xf56afb1cu  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xa49b4ceau  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -878,6 +878,10 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_STATE_FINE_SATURATED_MASK 0x00002000u
 #define AXIS_STATE_FINE_SATURATED_SHIFT 13
 #define AXIS_STATE_FINE_SATURATED_WIDTH 1
+// HAS_CAPTURE: levels of the touch probes, 0 and 1
+#define AXIS_STATE_PROBE_MASK 0x0000c000u
+#define AXIS_STATE_PROBE_SHIFT 14
+#define AXIS_STATE_PROBE_WIDTH 2
 // r: latched faults
 #define AXIS_FAULTS 0x00cu
 #define AXIS_FAULTS_LIMIT_LOW_MASK 0x00000001u

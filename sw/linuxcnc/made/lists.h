@@ -20,7 +20,8 @@ static const struct list_place READ_AXIS_FOLLOWING_ERROR = {.fixed = 1, .each = 
 static const struct list_place READ_AXIS_STREAM_STATE = {.fixed = 1, .each = 9, .width = 1};
 static const struct list_place READ_AXIS_STREAM_COUNTS = {.fixed = 1, .each = 10, .width = 1};
 static const struct list_place READ_AXIS_SUPERVISION = {.fixed = 1, .each = 11, .width = 1};
-enum { READS_FIXED = 1, READS_EACH = 12 };
+static const struct list_place READ_FEEDBACK_CAPTURE_STATE = {.fixed = 1, .each = 12, .width = 1};
+enum { READS_FIXED = 1, READS_EACH = 13 };
 
 static const struct list_place WRITE_AXIS_SET_POINT_POSITION = {.fixed = 0, .each = 0, .width = 2};
 static const struct list_place WRITE_AXIS_SET_POINT_VELOCITY = {.fixed = 0, .each = 2, .width = 1};

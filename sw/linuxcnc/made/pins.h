@@ -36,6 +36,7 @@ struct node_pins {
     hal_bit_t* estop;
     hal_bit_t* fault;
     hal_u32_t* fault_cause;
+    hal_bit_t* probe;
     hal_bit_t* ok;
 };
 
@@ -59,6 +60,7 @@ static const struct moire_pin NODE_PINS[] = {
     {"estop", HAL_BIT, HAL_OUT, offsetof(struct node_pins, estop)},
     {"fault", HAL_BIT, HAL_OUT, offsetof(struct node_pins, fault)},
     {"fault-cause", HAL_U32, HAL_OUT, offsetof(struct node_pins, fault_cause)},
+    {"probe", HAL_BIT, HAL_OUT, offsetof(struct node_pins, probe)},
     {"ok", HAL_BIT, HAL_OUT, offsetof(struct node_pins, ok)},
 };
 
@@ -72,6 +74,7 @@ struct axis_pins {
     hal_float_t* velocity_fb;
     hal_float_t* f_error;
     hal_float_t* position;
+    hal_float_t* position_latch;
     hal_s32_t* rawcounts;
     hal_bit_t* enabled;
     hal_bit_t* homed;
@@ -96,6 +99,7 @@ static const struct moire_pin AXIS_PINS[] = {
     {"velocity-fb", HAL_FLOAT, HAL_OUT, offsetof(struct axis_pins, velocity_fb)},
     {"f-error", HAL_FLOAT, HAL_OUT, offsetof(struct axis_pins, f_error)},
     {"position", HAL_FLOAT, HAL_OUT, offsetof(struct axis_pins, position)},
+    {"position-latch", HAL_FLOAT, HAL_OUT, offsetof(struct axis_pins, position_latch)},
     {"rawcounts", HAL_S32, HAL_OUT, offsetof(struct axis_pins, rawcounts)},
     {"enabled", HAL_BIT, HAL_OUT, offsetof(struct axis_pins, enabled)},
     {"homed", HAL_BIT, HAL_OUT, offsetof(struct axis_pins, homed)},
@@ -108,6 +112,36 @@ static const struct moire_pin AXIS_PINS[] = {
     {"set-points-late", HAL_U32, HAL_OUT, offsetof(struct axis_pins, set_points_late)},
     {"set-points-refused", HAL_U32, HAL_OUT, offsetof(struct axis_pins, set_points_refused)},
     {"ticks-extrapolated", HAL_U32, HAL_OUT, offsetof(struct axis_pins, ticks_extrapolated)},
+};
+
+struct encoder_pins {
+    hal_float_t* scale;
+    hal_bit_t* reset;
+    hal_bit_t* index_enable;
+    hal_float_t* position;
+    hal_float_t* velocity;
+    hal_s32_t* count;
+    hal_s32_t* rawcounts;
+};
+
+static const struct moire_pin ENCODER_PINS[] = {
+    {"scale", HAL_FLOAT, HAL_IN, offsetof(struct encoder_pins, scale)},
+    {"reset", HAL_BIT, HAL_IN, offsetof(struct encoder_pins, reset)},
+    {"index-enable", HAL_BIT, HAL_IO, offsetof(struct encoder_pins, index_enable)},
+    {"position", HAL_FLOAT, HAL_OUT, offsetof(struct encoder_pins, position)},
+    {"velocity", HAL_FLOAT, HAL_OUT, offsetof(struct encoder_pins, velocity)},
+    {"count", HAL_S32, HAL_OUT, offsetof(struct encoder_pins, count)},
+    {"rawcounts", HAL_S32, HAL_OUT, offsetof(struct encoder_pins, rawcounts)},
+};
+
+struct digin_pins {
+    hal_bit_t* in;
+    hal_bit_t* in_not;
+};
+
+static const struct moire_pin DIGIN_PINS[] = {
+    {"in", HAL_BIT, HAL_OUT, offsetof(struct digin_pins, in)},
+    {"in-not", HAL_BIT, HAL_OUT, offsetof(struct digin_pins, in_not)},
 };
 
 #define CAUSE_LIMIT_LOW 1u

@@ -102,6 +102,24 @@ class Core {  // a Verilated node and its clock
     Vnode___024root& pins;
 };
 
+// A touch probe at the pins probe_0 of all axes of a node. It touches where the sum of slope times
+// position, of all axes, is below `offset`.
+struct TouchProbe {
+    double slopes[AXES];
+    double offset;
+    bool touches(const std::vector<std::unique_ptr<Machine>>& machines, uint64_t now) const {
+        double height = -offset;
+        for (size_t n = 0; n < AXES; n++)
+            if (slopes[n] != 0) height += slopes[n] * machines[n]->position(now);
+        return height < 0;
+    }
+    static constexpr unsigned pins() {
+        unsigned found = 0;
+        for (int n = 0; n < AXES; n++) found |= 1u << 2 * n;
+        return found;
+    }
+};
+
 class Node {
  public:
     Node(unsigned address, const Firmware& firmware, const char* const* kinds,
@@ -116,6 +134,7 @@ class Node {
         if (core_) {
             auto& pins = core_->pins;
             pins.rs485_rx = rs485_rx;
+            if (probe) pins.probe = probe->touches(machines, now) ? TouchProbe::pins() : 0;
             core_->clk();
             if (drives_.take(pins) || now >= event_at_) {
                 event_at_ = NEVER;
@@ -172,6 +191,7 @@ class Node {
 
     std::vector<std::unique_ptr<Machine>> machines;
     std::unique_ptr<Devices> devices;
+    std::optional<TouchProbe> probe;
     bool line_drives = false,
          line_level = true;  // its driver enable and level after this cycle
 
@@ -374,6 +394,12 @@ void twin_bus_state(Twin* t, uint64_t* out) {
 }
 void twin_estop(Twin* t, int node, int pressed) {
     t->nodes[size_t(node)]->press_estop(pressed != 0);
+}
+// A touch probe at a node; slopes of its axes.
+void twin_fit_probe(Twin* t, int node, const double* slopes, double offset) {
+    auto& probe = t->nodes[size_t(node)]->probe.emplace();
+    std::copy_n(slopes, AXES, probe.slopes);
+    probe.offset = offset;
 }
 // The machine of an axis; machine_library.cpp has its functions.
 void* twin_machine(Twin* t, int axis) { return &machine_of(t, axis); }

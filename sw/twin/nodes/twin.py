@@ -101,6 +101,7 @@ FUNCTIONS: Functions = {
     "twin_cut": (None, [HANDLE, WHOLE, WHOLE]),
     "twin_bus_state": (None, [HANDLE, HANDLE]),
     "twin_estop": (None, [HANDLE, WHOLE, WHOLE]),
+    "twin_fit_probe": (None, [HANDLE, WHOLE, HANDLE, REAL]),
     "twin_machine": (HANDLE, [HANDLE, WHOLE]),
     "twin_attach_devices": (HANDLE, [HANDLE, WHOLE, HANDLE, ctypes.c_uint, LONG, WHOLE]),
     "twin_join_peers": (HANDLE, [HANDLE, WHOLE, WHOLE, LONG, REAL]),
@@ -480,6 +481,15 @@ class Twin:
     def set_plant(self, axis: int, **plant: float) -> None:
         """Change parameters of a running machine."""
         self.machine(axis).set(**plant)
+
+    def fit_probe(self, slopes: Sequence[float], offset_m: float, node: int = 0) -> None:
+        """Fits a touch probe at the pins probe_0 of all axes of a node. It touches a surface: where
+        the sum of slope times true position, of all axes of the node, is below `offset_m`.
+        """
+        if len(slopes) != self.node_axes:
+            raise ValueError(f"{len(slopes)} slopes for a node of {self.node_axes} axes")
+        each = array(slopes, numpy.float64)
+        self.library.twin_fit_probe(self.handle, self.check_node(node), each.ctypes.data, offset_m)
 
     # peripherals
 

@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xF56AFB1C  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xA49B4CEA  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -1031,6 +1031,12 @@ FIELDS = (
         0x08, 13, 1, False, "r", "",
         Fraction(1, 1),
         "fine stage at its limit",
+    ),
+    Field(
+        "axis", "state", "probe",
+        0x08, 14, 2, False, "r", "",
+        Fraction(1, 1),
+        "HAS_CAPTURE: levels of the touch probes, 0 and 1",
     ),
     Field(
         "axis", "faults", "limit_low",

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the tests of a module of the host once for each mutant of it, in processes that fork off.
+"""Runs the tests of a source once for each mutant of it, in processes that fork off.
 
-    python -m mutation.host_tests REQUEST.json
+    python -m mutation.forked_tests REQUEST.json
 
-The request has the name of the module, its tests, a text of the module for each mutant, the seed of
-the tests and the longest computing time of a run in s. The program loads what the tests need from
-other packages, but nothing of this project. For each text it forks a process that imports the
-module from this text and runs the tests until one fails. Each line of the output is JSON:
+The request has the language and the name of the source, its tests, a text of the source for each
+mutant, the seed of the tests and the longest computing time of a run in s. The program loads what
+the tests need from other packages, but nothing of this project that it mutates. For each text it
+forks a process that runs the tests until one fails: a module of the host is imported from the text,
+a source of the firmware is compiled from it. Each line of the output is JSON:
 [number of the text, the test that failed, computing time in s]; the name of the test is empty for a
 survivor. It is `(no end)` if the run takes longer than it may, and `(the process ends by itself)`
 if no test has failed then.
@@ -19,7 +20,9 @@ import os
 import resource
 import signal
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import CodeType, ModuleType
 
@@ -29,9 +32,11 @@ import pytest
 import rich.console
 
 from twin.build import ROOT
+from twin.compiled import host_library
 
 NO_END, ENDS = "(no end)", "(the process ends by itself)"
 WAITING = 10  # a run that waits takes no computing time: the clock may show so many times more
+Request = Mapping[str, object]
 LOADED = (hypothesis, np, rich.console)  # for all forks at once
 
 
@@ -77,24 +82,41 @@ class FirstFailure:
             os.write(self.pipe, report.nodeid.encode())
 
 
-def run(finder: TextFinder, tests: Sequence[str], pipe: int) -> int:
-    """Run the tests on a text, in a process of its own; the exit code is that of pytest."""
+def import_module(request: Request, text: str) -> None:
+    """From now on the module is imported from the text."""
+    finder = TextFinder(str(request["source"]), Path(str(request["path"])), text)
+    sys.meta_path.insert(0, finder)
+
+
+def compile_firmware(request: Request, text: str) -> None:
+    """From now on the firmware is compiled with the text in place of the source."""
+    source = Path(str(request["path"]))
+    file = Path(tempfile.mkdtemp(dir=str(request["folder"]))) / source.name
+    file.write_text(text)
+    os.environ[host_library.MUTANT] = f"{source}={file}"
+
+
+LANGUAGES = {"host": import_module, "firmware": compile_firmware}
+
+
+def run(tests: Sequence[str], pipe: int) -> int:
+    """Run the tests in a process of its own; the exit code is that of pytest."""
     null = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(null, stream)
-    sys.meta_path.insert(0, finder)
     options = ["-x", "-q", "-p", "no:cacheprovider", "--rootdir", str(ROOT)]
     return int(pytest.main([*options, *tests], plugins=[FirstFailure(pipe)]))
 
 
-def forked(finder: TextFinder, tests: Sequence[str], longest_s: float) -> tuple[str, float]:
-    """The test that failed, and the computing time of the run in s."""
+def forked(mutate: Callable[[], None], tests: Sequence[str], longest_s: float) -> tuple[str, float]:
+    """The test that failed with the source mutated, and the computing time of the run in s."""
     end, pipe = os.pipe()
     pid = os.fork()
     if not pid:
         resource.setrlimit(resource.RLIMIT_CPU, (int(longest_s) + 1, int(longest_s) + 2))
         signal.alarm(WAITING * (int(longest_s) + 1))
-        os._exit(run(finder, tests, pipe))
+        mutate()
+        os._exit(run(tests, pipe))
     os.close(pipe)
     with os.fdopen(end) as file:
         failed = file.read()
@@ -109,9 +131,10 @@ def forked(finder: TextFinder, tests: Sequence[str], longest_s: float) -> tuple[
 def main(request: Path) -> None:
     asked = json.loads(request.read_text())
     os.environ["SEED"] = str(asked["seed"])
+    mutate = LANGUAGES[asked["language"]]
     for number, text in enumerate(asked["texts"]):
-        finder = TextFinder(asked["module"], Path(asked["path"]), text)
-        failed, seconds = forked(finder, asked["tests"], asked["longest_s"])
+        change = partial(mutate, asked, text)
+        failed, seconds = forked(change, asked["tests"], asked["longest_s"])
         print(json.dumps([number, failed, seconds]), flush=True)
 
 
