@@ -31,6 +31,7 @@ PARAMETERS = {
     "HAS_DISPLAY": 1,
     "HAS_STATUS_INPUTS": 1,
     "HAS_LINK": 1,
+    "SCOPE_WORDS": 256,
     "HAS_SET_POINTS": 3,
     "HAS_BACKLASH": 3,
     "MEMORY_BYTES": 4096,
@@ -71,14 +72,20 @@ class Node(Bench):
 
     # ---- registers
 
+    @staticmethod
+    def word(register, /, **fields):
+        """The word of a register with these fields, others 0."""
+        value = 0
+        for name, number in fields.items():
+            field = next(f for f in REGISTERS[tuple(register.split("."))] if f.field == name)
+            value |= (number & (1 << field.width) - 1) << field.low
+        return value
+
     def write(self, register, value=None, /, axis=0, **fields):
         """Write a register, `block.name`: its value, or the values of its fields, others 0."""
         known = REGISTERS[tuple(register.split("."))]
         if value is None:
-            value = 0
-            for name, number in fields.items():
-                field = next(f for f in known if f.field == name)
-                value |= (number & (1 << field.width) - 1) << field.low
+            value = self.word(register, **fields)
         address = known[0].address(axis)
         self.access(address, value & 0xFFFFFFFF)
         if known[0].width > 32:

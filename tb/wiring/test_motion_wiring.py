@@ -21,7 +21,7 @@ def play(node, axis, velocity, ticks):
 
 def test_the_node_reports_what_it_is(node):
     build = node.fields("node.build")
-    assert build == {"axes": 3, "address": 5, "memory": 4, "scope": 0}
+    assert build == {"axes": 3, "address": 5, "memory": 4, "scope": 1}
     assert node.read("node.clk_hz") == CLK_HZ
     first = node.now, node.read("node.time_stamp")
     node.run(1000)
@@ -151,6 +151,34 @@ def test_a_stream_without_set_points_goes_on_and_stops_and_a_late_one_is_counted
     assert node.read("axis.stream_state", "ended", axis) == LATE
     assert node.read("axis.stream_state", "extrapolated", axis) >= 20
     assert "moving" not in node.bits("axis.state", axis)
+    assert not node.bits("axis.faults", axis), "the player stops it, before the queue is empty"
+
+
+def test_segments_in_the_registers_are_left_out_while_an_axis_is_streamed(node):
+    node.start()
+    node.enable(0)
+    node.ticks(2)
+    stream(node, 0)
+    set_point(node, 0, node.read("node.tick_count") + 20, 10_000, 1_000)
+    free = node.read("axis.state", "queue_free")
+    node.segment(0, 0x4000, 100)
+    assert node.read("axis.state", "queue_free") >= free
+    node.ticks(12)
+    assert abs(node.read("axis.target")) < 10_000
+
+
+def test_a_reset_ends_a_stream(node):
+    node.start()
+    node.enable(0)
+    node.ticks(2)
+    stream(node, 0)
+    assert node.read("axis.stream_state", "mode") == PREPARED
+    node.set(rst=1)
+    node.run(16)
+    node.set(rst=0)
+    node.run(4000)
+    assert node.read("axis.stream_state", "mode") == OFF
+    assert node.read("node.tick_count") == 0
 
 
 def test_a_stream_ends_in_a_stop_and_needs_a_drive(node):
