@@ -31,8 +31,8 @@
 //           bit 16 the head of the queue, bit 20 its length), 1 target in 2^-16 period, 2 its
 //           velocity and 3 the measured velocity in 2^-16 period/tick, 4 following error in 2^-16
 //           period (flag: above following_limit), 5 command (flag: at its limit), 6 target in 2^-16
-//           motor step (flag: restart there), 7 underrun. The integral of the servo comes before each
-//           command, with a strobe of its own, in 2^-16 command.
+//           motor step (flag: restart there), 7 underrun. The integral of the servo comes before
+//           each command, with a strobe of its own, in 2^-16 command.
 //           A setting is written within 100 cycles between two ticks, and before the next axis is
 //           served during a tick. While there is nothing to do, the program stays at one line.
 // limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units:

@@ -271,8 +271,8 @@ module one_axis_bench (
         chain_overspeed[0], chain_disagreement[0], chain_lost[0]
     };
     wire unused = &{
-        1'b0, chain, address[1:0], tick_period[23:18], settings, result_axis, integral_valid, compare_pulse,
-        adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi, phase, fine_command, faults
+        1'b0, chain, address[1:0], tick_period[23:18], settings, result_axis, integral_valid,
+        compare_pulse, adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi, phase, fine_command, faults
     };
 endmodule
 

@@ -4,6 +4,7 @@ streams, and what is refused; test_firmware_tick_scope has the side of the node.
 """
 
 import io
+import threading
 
 import numpy
 import pytest
@@ -271,6 +272,30 @@ def test_a_waveform_is_loaded_and_lasts_as_long_as_the_block():
     scope.axis.disable()
     with pytest.raises(Refused, match="the drive is off"), scope.excited(100):
         pass
+
+
+def test_the_watchdog_hears_requests_while_a_picture_is_drawn_with_the_drive_on(
+    tmp_path, monkeypatch
+):
+    node, heard = node_of(Axis()), threading.Event()
+    node.home()
+
+    def picture(record):
+        node.port.on_request = lambda name, fields: heard.set()
+        assert heard.wait(30)
+        return b"drawn"
+
+    monkeypatch.setattr(tick_scope.TickRecord, "picture", picture)
+    call = Call(
+        f"scope record --samples 9 -- move 1um -- scope save {tmp_path / 'a.csv'} --picture "
+        f"{tmp_path / 'a.png'}".split(),
+        node,
+    )
+    assert call.code == 0, call.err
+    assert (tmp_path / "a.png").read_bytes() == b"drawn"
+    heard.clear()
+    call = Call(f"scope save {tmp_path / 'b.csv'}".split(), node_of())
+    assert call.code != 0 and not heard.is_set(), "nothing was switched on"
 
 
 def test_scope_record_and_save_write_files_with_units(tmp_path):

@@ -430,7 +430,8 @@ def test_the_plots_and_the_parameters_show_what_the_axis_does_at_every_width(ser
     page.keyboard.press("Enter")
     see(page, "#parameters .message.wrong", "many")
     page.get_by_role("searchbox").fill("")
-    page.get_by_label("only what differs").check()
+    shown = page.locator("#parameters [name=shown]")
+    shown.select_option("default")
     names = page.locator("#parameters tbody tr:visible th").all_inner_texts()
     assert "kp" in names and "velocity" not in names
     page.get_by_role("searchbox").fill("fine_")
@@ -515,9 +516,6 @@ def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(se
             [name, *(written(v, *how) for v in (values[a], values[b], values[b] - values[a]))]
             for name, (values, *how) in expected.items()
         ]
-    page.evaluate("document.querySelector('header').style.position = 'static'")
-    scope.screenshot(path=SCOPE_PICTURE)
-    page.evaluate("document.querySelector('header').style.position = ''")
     scope.get_by_label("Cursor A").focus()
     page.keyboard.press("ArrowRight")
     see(page, "#scope tbody", written(time_ms[65], 3, "ms"))
@@ -573,6 +571,9 @@ def test_a_record_of_ticks_is_triggered_by_any_signal_and_has_what_came_before(t
     assert page.evaluate(NOT_DRAWN, ["Position", time_ms, places]) == []
     see(page, "#scope figcaption", "Axis 1 error in µm over ms")
     see(page, "#scope figcaption", "Integral in % over ms")
+    page.evaluate("document.querySelector('header').style.position = 'static'")
+    scope.screenshot(path=SCOPE_PICTURE)
+    page.evaluate("document.querySelector('header').style.position = ''")
     with page.expect_download() as download:
         scope.get_by_role("button", name="Export CSV").click()
     assert download.value.path().read_text() == record["csv"]
@@ -750,12 +751,22 @@ def test_a_job_is_shown_and_begun(browser, context):
         served.end()
 
 
-def test_an_axis_has_the_name_of_the_description(browser, context):
-    axes = {"x": AxisDescription("x", 1, 0)}
+def test_an_axis_has_the_name_of_the_description_and_shows_what_differs_from_it(browser, context):
+    parameters = {"velocity": "4 mm/s", "kp": "0.125", "home_method": "s0"}
+    axes = {"x": AxisDescription("x", 1, 0, parameters=parameters)}
     served = Served(homed(), description=Description("", "", None, axes))
     page = opened(context, served.door.url)
     try:
         see(page, ".axis h2", "x (axis 1.0)")
+        with served.http() as client:
+            client.done("PUT", f"{AXIS}/parameters/kp", {"value": "0.125"})
+            assert client.done("GET", f"{AXIS}/parameters/kp")["as_described"] is True
+            assert client.done("GET", f"{AXIS}/parameters/kd")["described"] is None
+        page.get_by_role("button", name="Read").click()
+        see(page, "#parameters tr", "machine.toml: 4 mm/s")
+        page.locator("#parameters [name=shown]").select_option("described")
+        names = page.locator("#parameters tbody tr:visible th").all_inner_texts()
+        assert names == ["velocity"]
     finally:
         page.close()
         served.end()

@@ -82,7 +82,8 @@ module axis_on_wishbone #(
     wire estop, heartbeat_kick, armed, cpu_stopped, servo_overrun;
     // motion engine
     wire pending, moves, moved, request_waits, step_made, step_down, block_up, block_down;
-    wire closed_loop, play, arm, controlled_stop, hold_target, result_valid, integral_valid, result_flag;
+    wire closed_loop, play, arm, controlled_stop, hold_target;
+    wire result_valid, integral_valid, result_flag;
     wire [2:0] result_axis, result_kind;
     wire [47:0] position, moved_by, result;
     wire [23:0] take_up;

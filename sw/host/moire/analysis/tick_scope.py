@@ -462,9 +462,9 @@ class TickScope:
                 values[whole] = numpy.asarray(row, float)
             else:
                 values[whole] = signed(row, 16 if name == "command" else 32)
-        for axis in periods:
+        for before in (f"{axis}." if axis else "" for axis in periods):
             target, error, position = (
-                f"{axis}.{name}" if axis else name for name in ("target", "error", "position")
+                f"{before}{name}" for name in ("target", "error", "position")
             )
             if target in values and error in values and position not in values:
                 values[position] = values[target] - values[error]

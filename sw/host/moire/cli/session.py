@@ -4,7 +4,9 @@
 import json
 import signal
 import sys
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TextIO
@@ -21,6 +23,7 @@ from moire.client.records import Status
 from moire.description import AxisDescription, Description
 from moire.errors import MoireError
 
+KEEP_S = 0.1  # between two requests to nodes with a drive on, while the host computes
 WIDTH = 100  # of a line that is overwritten while a motion goes on
 OpenTransport = Callable[[Options], Transport]
 
@@ -120,6 +123,30 @@ class Session:
             self.print(json.dumps(values))
         else:
             print(f"moire: {error}", file=self.err, flush=True)
+
+    @contextmanager
+    def computing(self) -> Iterator[None]:
+        """For a block that takes long and does not use the bus: the watchdogs of the nodes whose
+        drives this call has switched on hear requests meanwhile.
+        """
+        axes = {axis.node.address: axis for axis in self.switched_on.values()}
+        over = threading.Event()
+
+        def keep() -> None:
+            while not over.wait(KEEP_S):
+                for axis in axes.values():
+                    with suppress(MoireError):  # the next request meets it, too
+                        axis.request("position")
+
+        thread = threading.Thread(target=keep, name="keep", daemon=True)
+        if axes:
+            thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            if axes:
+                thread.join()
 
     def close(self) -> None:
         """Switch off what this call has switched on, and close the port."""

@@ -519,36 +519,50 @@ async def segments(call: Call) -> Values:
 
 
 async def parameters(call: Call) -> Values:
-    found: dict[str, ParameterValue] = await call.command(lambda axis: axis.parameters(), "long")
-    return {"parameters": [parameter_values(value) for value in found.values()]}
-
-
-async def parameter(call: Call) -> Values:
-    value: ParameterValue = await call.command(lambda axis: axis.get_parameter(call.name))
-    return parameter_values(value)
-
-
-async def set_parameter(call: Call) -> Values:
-    value: ParameterValue = await call.command(
-        lambda axis: axis.set_parameter(call.name, call.given["value"])
-    )
-    return parameter_values(value)
+    return await of_parameters(call, lambda axis: [*axis.parameters().values()])
 
 
 async def set_parameters(call: Call) -> Values:
-    found: dict[str, ParameterValue] = await call.command(
-        lambda axis: axis.load_parameters(call.given), "long"
+    return await of_parameters(call, lambda axis: [*axis.load_parameters(call.given).values()])
+
+
+async def of_parameters(call: Call, work: Callable[[Axis], list[ParameterValue]]) -> Values:
+    return {
+        "parameters": await call.command(
+            lambda axis: [parameter_values(call, axis, value) for value in work(axis)], "long"
+        )
+    }
+
+
+async def parameter(call: Call) -> Values:
+    return await call.command(
+        lambda axis: parameter_values(call, axis, axis.get_parameter(call.name))
     )
-    return {"parameters": [parameter_values(value) for value in found.values()]}
 
 
-def parameter_values(value: ParameterValue) -> Values:
-    """A parameter, with its limits and its default as they are written."""
+async def set_parameter(call: Call) -> Values:
+    return await call.command(
+        lambda axis: parameter_values(
+            call, axis, axis.set_parameter(call.name, call.given["value"])
+        )
+    )
+
+
+def parameter_values(call: Call, axis: Axis, value: ParameterValue) -> Values:
+    """A parameter, with its limits and its default as they are written, and whether it is as the
+    machine file describes it.
+    """
+    described = call.bridge.description.at(*call.place).parameters.get(value.name)
+    agrees = None
+    if described is not None:
+        agrees = axis.parameter_counts(value.name, described) == value.counts
     return {
         **value.values(),
         "group": group_of(value.name),
         "allowed": value.range_words,
         "default_written": value.default_written,
+        "described": described,
+        "as_described": agrees,
     }
 
 
@@ -593,6 +607,8 @@ PARAMETER = {
     "group": ("text", "what it belongs to, such as servo"),
     "allowed": ("text", "the limits with their unit, or the names of the choices"),
     "default_written": ("text", "the default, written as `written` is"),
+    "described": ("text or null", "its value in the machine file of the server"),
+    "as_described": ("flag or null", "whether it has that value"),
 }
 JOB = {
     "built": ("flag", "whether the node is one of a station"),

@@ -20,6 +20,7 @@ SCHEMAS: Mapping[str, dict[str, Any]] = {  # of the types that the table names
     "whole number": {"type": "integer"},
     "number": {"type": "number"},
     "text or null": {"type": ["string", "null"]},
+    "flag or null": {"type": ["boolean", "null"]},
     "number or null": {"type": ["number", "null"]},
     "whole number or null": {"type": ["integer", "null"]},
     "list of texts or null": {"type": ["array", "null"], "items": {"type": "string"}},

@@ -73,7 +73,9 @@ def check(call: Call, amplitude: Fraction, steps: int, picture: str | None) -> N
     axis = call.axis
     gains = fine.Gains(*(axis.get_parameter(name).counts for name in fine.NAMES))
     if picture:
-        write_bytes(picture, fine.picture(plant, gains))
+        with call.session.computing():
+            drawn = fine.picture(plant, gains)
+        write_bytes(picture, drawn)
     say(call, plant, gains, fine.check(plant, gains), "in force", {})
 
 
@@ -104,7 +106,9 @@ def tune(
     plant = measured(call, amplitude, steps)
     gains = fine.propose(plant, damped)
     if picture:
-        write_bytes(picture, fine.picture(plant, gains))
+        with call.session.computing():
+            drawn = fine.picture(plant, gains)
+        write_bytes(picture, drawn)
     found = fine.check(plant, gains)
     if write:
         for name in fine.NAMES:

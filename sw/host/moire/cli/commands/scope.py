@@ -103,7 +103,9 @@ def read(call: Call, file: str, picture: str | None, timeout: Fraction) -> None:
     record = Scope(call.axis).wait(timeout)
     write_bytes(file, record.csv().encode())
     if picture:
-        write_bytes(picture, record.picture())
+        with call.session.computing():
+            drawn = record.picture()
+        write_bytes(picture, drawn)
     values = asdict(record)
     values["drive_command"] = values.pop("command")
     first, last = units.format_time(record.time_s[0]), units.format_time(record.time_s[-1])
@@ -172,9 +174,12 @@ def numbered(call: Call, name: str) -> str:
 
 def write(call: Call, file: str, made: TickRecord, picture: str | None, more: str = "") -> None:
     """Writes a recording, and says so."""
-    write_bytes(file, made.parquet() if file.endswith(".parquet") else made.csv().encode())
+    with call.session.computing():
+        table = made.parquet() if file.endswith(".parquet") else made.csv().encode()
+        drawn = made.picture() if picture else b""
+    write_bytes(file, table)
     if picture:
-        write_bytes(picture, made.picture())
+        write_bytes(picture, drawn)
     call.say_of_axis(
         {"file": file, **{name: list(values) for name, values in made.columns().items()}},
         f"{len(made.time_s)} samples of {', '.join(made.values)} in {file}{more}",

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -202,31 +203,30 @@ def tune(
         return
     tick_s = float(tick or Fraction(1, call.node.identity.tick_hz))
     response = None
-    plant: tuner.Plant
+    identify: Callable[[], tuner.Plant]
     if file is not None:
-        plant = tuner.identify(tuner.Record(*read_record(file), tick_s))
+        identify = partial(tuner.identify, tuner.Record(*read_record(file), tick_s))
     elif method == RESPONSE or (method is None and TickScope(call.axis).words()):
         nm_s = None if speed is None else speed * 1_000_000
         response = frequency_response.measure(call.switch_on(), peak, nm_s, records, float(lowest))
         if points:
             write_text(points, response.csv())
-        plant = frequency_response.fit(response)
+        identify = partial(frequency_response.fit, response)
     else:
         record = scope.excite(call.switch_on(), amplitude, every, reach)
-        plant = tuner.identify_samples(*scope.lsb(record), tick_s)
+        identify = partial(tuner.identify_samples, *scope.lsb(record), tick_s)
     current = frequency_response.in_force(call.axis)
-    if check:
-        found = [proposals.judged(plant, proposals.IN_FORCE, current)]
-    else:
-        found = proposals.of(
-            plant,
-            current,
-            margin,
-            None if bandwidth is None else float(bandwidth),
-            call.axis.built().has("filters"),
-        )
+    wished_hz = None if bandwidth is None else float(bandwidth)
+    has_filters = call.axis.built().has("filters")
+    with call.session.computing():
+        plant = identify()
+        if check:
+            found = [proposals.judged(plant, proposals.IN_FORCE, current)]
+        else:
+            found = proposals.of(plant, current, margin, wished_hz, has_filters)
+        drawn = proposals.picture(plant, found) if picture else b""
     if picture:
-        write_bytes(picture, proposals.picture(plant, found))
+        write_bytes(picture, drawn)
     if check:
         tuner.check(plant, current)
     chosen = found[0] if check else proposals.best(found)

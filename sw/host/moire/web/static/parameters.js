@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parameters of an axis by group: value with unit, limits, default, search, what differs.
+// The parameters of an axis by group: value with unit, limits, default, search, what differs from
+// the default or from the machine file.
 
 import { sentence } from "./format.js";
 import { pathOf } from "./link.js";
@@ -13,19 +14,23 @@ export class ParameterTable {
         <label>Axis <select></select></label>
         <button type="button">Read</button>
         <label>Search <input type="search" autocomplete="off" spellcheck="false"></label>
-        <label><input type="checkbox"> only what differs from the default</label>
+        <label>Shown <select name="shown">
+          <option value="all">all</option>
+          <option value="default">what differs from the default</option>
+          <option value="described">what differs from machine.toml</option>
+        </select></label>
       </div>
       <p class="message" role="status"></p>
       <div class="table"></div>`;
     this.axis = section.querySelector("select");
     this.search = section.querySelector("[type=search]");
-    this.changed = section.querySelector("[type=checkbox]");
+    this.shown = section.querySelector("[name=shown]");
     this.message = section.querySelector(".message");
     this.table = section.querySelector(".table");
     section.querySelector("button").onclick = () => this.read();
     this.axis.onchange = () => this.clear();
     this.search.oninput = () => this.filter();
-    this.changed.onchange = () => this.filter();
+    this.shown.onchange = () => this.filter();
   }
 
   open(names, mayChange) {
@@ -87,6 +92,7 @@ export class ParameterTable {
     row.append(name, ...[0, 1, 2, 3].map(() => document.createElement("td")));
     const [value, preset, limits, text] = row.querySelectorAll("td");
     preset.textContent = known.default_written;
+    if (known.described !== null) preset.textContent += `; machine.toml: ${known.described}`;
     limits.textContent = known.allowed;
     text.textContent = known.text;
     if (this.mayChange) {
@@ -131,7 +137,12 @@ export class ParameterTable {
     for (const row of this.rows) {
       const text = `${row.known.name} ${row.known.text}`.toLowerCase();
       const fits = words.every((word) => text.includes(word));
-      row.hidden = !fits || (this.changed.checked && row.known.value === row.known.default);
+      const differs = {
+        all: true,
+        default: row.known.value !== row.known.default,
+        described: row.known.as_described === false,
+      };
+      row.hidden = !fits || !differs[this.shown.value];
       shown += !row.hidden;
     }
     for (const table of this.table.children) {

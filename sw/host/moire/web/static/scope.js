@@ -49,7 +49,7 @@ export class ScopePanel {
       <div class="bar"><h2 id="scope-title">Scope</h2></div>
       <form class="row">
         <label>Axis <select name="axis"></select></label>
-        <label data-field="recorder">Recorder <select name="recorder">
+        <label data-field="recorder" hidden>Recorder <select name="recorder">
           <option value="ticks">each servo tick</option>
           <option value="scope">128 samples</option></select></label>
         <div class="signals" data-of="ticks" role="group" aria-label="Recorded signals"></div>
@@ -157,7 +157,7 @@ export class ScopePanel {
     this.section.querySelector("[data-field=recorder]").hidden = this.recorder.words === 0;
     count.max = this.recorder.words;
     const known = Object.entries(this.recorder.signals);
-    of.replaceChildren(...known.map(([signal, what]) => new Option(signal, signal)));
+    of.replaceChildren(...known.map(([signal]) => new Option(signal)));
     of.value = "error";
     const own = Number(name.split(".").at(-1));
     const axes = [...Array(this.recorder.axes).keys()];
@@ -188,7 +188,7 @@ export class ScopePanel {
     const names = Object.keys(words).join();
     if (names !== [...trigger.options].map((one) => one.value).join()) {
       trigger.replaceChildren(...Object.entries(words).map(([name, what]) => new Option(what, name)));
-      every.value = isTicks ? `${1e6 * this.recorder.tick_s}us` : "1ms";
+      every.value = isTicks ? `${Number((1e6 * this.recorder.tick_s).toFixed(3))}us` : "1ms";
     }
     this.showLevel();
   }
@@ -397,7 +397,8 @@ export class ScopePanel {
         `${lines[largest].toFixed(signal.digits)} ${signal.unit} at ${xs[largest].toFixed(2)} Hz.`;
     } else {
       this.cursors = [this.record.before, xs.length - 1];
-      this.note.textContent = "Time 0 is the trigger. Error is target − position.";
+      const zero = this.streams ? "first sample" : "trigger";
+      this.note.textContent = `Time 0 is the ${zero}. Error is target − position.`;
     }
     for (const slider of this.sliders) slider.max = xs.length - 1;
     this.draw();
