@@ -57,6 +57,7 @@ module motion #(
     output logic [32*AXES-1:0] stream_counts,  // counts of set-points of each axis
     // results, as in motion_engine
     output logic result_valid,  // strobe: result is new
+    output logic integral_valid,  // strobe: result is the integral
     output logic [2:0] result_axis,  // number of its axis
     output logic [2:0] result_kind,  // number of what it is
     output logic [47:0] result,  // value, signed
@@ -209,6 +210,7 @@ module motion #(
             .waits                 (request_waits),
             // results
             .result_valid,
+            .integral_valid,
             .result_axis,
             .result_kind,
             .result,
@@ -223,7 +225,7 @@ module motion #(
         wire unused = &{1'b0, busy};
     end else begin : g_no_engine
         assign {hold, waits, request_waits} = '0;
-        assign {result_valid, result_axis, result_kind, result, result_flag} = '0;
+        assign {result_valid, integral_valid, result_axis, result_kind, result, result_flag} = '0;
         assign {servo_overrun, cycles} = '0;
         assign {tick_count, stream_states, stream_counts} = '0;
 

@@ -175,7 +175,7 @@ module node #(
     wire [24*AXES-1:0] take_up;
     wire [AXES-1:0] step_made, step_down, moves, moved, block_up, block_down, closed_loop;
     wire [AXES-1:0] play, arm, controlled_stop, hold_target, request_waits, pending;
-    wire result_valid, result_flag, servo_overrun;
+    wire result_valid, integral_valid, result_flag, servo_overrun;
     wire [2:0] result_axis, result_kind;
     wire [47:0] result, computed;  // with and without the excitation
     wire [15:0] cycles;
@@ -183,9 +183,9 @@ module node #(
     wire [32*AXES-1:0] stream_states, stream_counts;
     // recorder of ticks, excitation
     wire [2:0] scope_axis, excitation_axis;
-    wire [9:0] scope_signals;
+    wire [2:0] scope_last, scope_mode;
     wire [3:0] scope_trigger;
-    wire [2:0] scope_mode;
+    wire [31:0] scope_channels_0, scope_channels_4;
     wire [15:0] scope_length, scope_every, scope_earlier, scope_delay;
     wire scope_start, scope_read, excitation_written;
     wire [31:0] scope_level, scope_word;
@@ -372,9 +372,11 @@ module node #(
         .tick_count,
         // recorder of ticks
         .scope_axis,
-        .scope_signals,
+        .scope_last,
         .scope_trigger,
         .scope_mode,
+        .scope_channels_0,
+        .scope_channels_4,
         .scope_samples_length    (scope_length),
         .scope_samples_every     (scope_every),
         .scope_place_earlier     (scope_earlier),
@@ -495,6 +497,7 @@ module node #(
         .stream_counts,
         // results
         .result_valid,
+        .integral_valid,
         .result_axis,
         .result_kind,
         .result     (computed),
@@ -514,8 +517,9 @@ module node #(
 
     if (SCOPE_WORDS != 0) begin : g_scope
         wire first, triggered;
-        wire [W-1:0] sine = sample_sin[W*scope_axis+:W];
-        wire [W-1:0] cosine = sample_cos[W*scope_axis+:W];
+        wire [  2:0] seen_axis;
+        wire [W-1:0] sine = sample_sin[W*seen_axis+:W];
+        wire [W-1:0] cosine = sample_cos[W*seen_axis+:W];
 
         command_excitation u_excitation (
             .clk,
@@ -538,39 +542,42 @@ module node #(
             .first
         );
         tick_recorder #(
+            .AXES (AXES),
             .WORDS(SCOPE_WORDS)
         ) u_recorder (
             .clk,
             .rst,
             // settings
-            .start         (scope_start),
-            .axis          (scope_axis),
-            .signals       (scope_signals),
-            .trigger_signal(scope_trigger),
-            .trigger_mode  (scope_mode),
-            .level         (scope_level),
-            .length        (scope_length),
-            .every         (scope_every),
-            .earlier       (scope_earlier),
-            .delay         (scope_delay),
+            .start       (scope_start),
+            .last        (scope_last),
+            .channels    ({scope_channels_4, scope_channels_0}),
+            .trigger     ({1'b0, scope_axis, scope_trigger}),
+            .trigger_mode(scope_mode),
+            .level       (scope_level),
+            .length      (scope_length),
+            .every       (scope_every),
+            .earlier     (scope_earlier),
+            .delay       (scope_delay),
             // what is recorded
             .tick,
-            .ready         (first),
-            .sine_cosine   ({16'($signed(cosine)), 16'($signed(sine))}),
-            .target        (targets[48*scope_axis+:32]),
-            .position      (position[48*scope_axis+:32]),
-            .interpolated  (32'(phases[16*scope_axis+:16])),
-            .fine_command  (32'($signed(fine_commands[16*scope_axis+:16]))),
-            .faults        (32'(axis_faults[13*scope_axis+:13])),
-            .valid         (result_valid),
+            .ready       (first),
+            .seen_axis,
+            .sine_cosine ({16'($signed(cosine)), 16'($signed(sine))}),
+            .target      (targets[48*seen_axis+:32]),
+            .position    (position[48*seen_axis+:32]),
+            .interpolated(32'(phases[16*seen_axis+:16])),
+            .fine_command(32'($signed(fine_commands[16*seen_axis+:16]))),
+            .faults      (32'(axis_faults[13*seen_axis+:13])),
+            .valid       (result_valid),
+            .integral_valid,
             .result_axis,
-            .kind          (result_kind),
-            .result        (result[31:0]),
+            .kind        (result_kind),
+            .result      (result[31:0]),
             // reading
-            .read          (scope_read),
-            .word          (scope_word),
-            .phase         (scope_phase),
-            .available     (scope_available),
+            .read        (scope_read),
+            .word        (scope_word),
+            .phase       (scope_phase),
+            .available   (scope_available),
             // excitation
             .triggered
         );
@@ -579,9 +586,9 @@ module node #(
         assign {scope_word, scope_phase, scope_available} = '0;
 
         wire unused_scope = &{
-            1'b0, scope_axis, scope_signals, scope_trigger, scope_mode, scope_level, scope_length,
-            scope_every, scope_earlier, scope_delay, scope_start, scope_read, phases,
-            fine_commands, axis_faults, targets
+            1'b0, scope_axis, scope_last, scope_trigger, scope_mode, scope_level, scope_length,
+            scope_channels_0, scope_channels_4, scope_every, scope_earlier, scope_delay,
+            scope_start, scope_read, integral_valid, phases, fine_commands, axis_faults, targets
         };
         wire unused_excitation = &{
             1'b0, excitation_axis, excitation_period, excitation_limit, excitation_value,

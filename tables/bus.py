@@ -60,6 +60,7 @@ CODES = (
     "calibration_action",
     "scope_trigger",
     "scope_state",
+    "tick_signal",
     "tick_trigger",
     "turn_phase",
     "peer_phase",

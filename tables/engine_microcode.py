@@ -215,7 +215,10 @@ CONDITIONS = {"never": 0} | {
     )
     for n, name in enumerate(names, start=first)
 }
-GIVEN = ("state", "target", "target_velocity", "velocity", "error", "command", "steps", "underrun")
+GIVEN = (
+    *("state", "target", "target_velocity", "velocity", "error", "command", "steps", "underrun"),
+    "integral",  # has a strobe of its own, the others have result_valid and their number
+)
 ACTIONS = (
     {"load_context": 0x20, "first_axis": 0x21, "next_axis": 0x22, "sample": 0x23, "stand": 0x24}
     | {"finished": 0x25, "pop": 0x26, "push": 0x27, "empty": 0x28, "booted": 0x29}
@@ -464,7 +467,7 @@ clamp:  acc - integral_limit            ; below, first_filter
         acc + integral_limit
         acc + integral_limit            ; above
         acc - integral_limit >> 8 -> integral
-        acc -> total
+        acc -> total                    ; give integral
         error                           ; x
         kp                              ; y
         target_velocity

@@ -5,7 +5,7 @@ A command is a line of an indented or `sh` code block that begins with `moire`, 
 `pip` or a program of build/venv. Each page is one session in an empty folder of its own:
 
 - commands for hardware (`--port /dev/ttyUSB0`, or no port at all) go to a served twin; a page says
-  `<!-- machine: s4 -->` where this is not the stage of S0;
+  `<!-- machine: s4 -->` where this is not the X axis of S0;
 - a code block with the info string `csv NAME` or `toml NAME` is written to the file NAME first;
 - a `python` code block that begins with an import is run as a program;
 - `moire twin` serves until the next one, an experiment or the end of the page, and what would run
@@ -60,7 +60,7 @@ class Page:
     commands: list[str] = field(default_factory=list)
     programs: list[str] = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)
-    machine: str = "s0"
+    machine: str = "s0 --nodes 1"  # with options of `moire twin`
 
 
 def code_lines(text: str) -> Iterator[tuple[str, str]]:

@@ -305,7 +305,7 @@ module engine_microcode #(
         lines[267] = 36'h00007e320;  // acc + integral_limit
         lines[268] = 36'h00007e323;  // acc + integral_limit ; above
         lines[269] = 36'h000050334;  // acc - integral_limit >> 8 -> integral
-        lines[270] = 36'h000057c20;  // acc -> total
+        lines[270] = 36'h220057c20;  // acc -> total ; give integral
         lines[271] = 36'h00007e7c5;  // error ; x
         lines[272] = 36'h00007ec08;  // kp ; y
         lines[273] = 36'h00007e580;  // target_velocity

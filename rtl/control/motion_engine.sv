@@ -31,7 +31,8 @@
 //           bit 16 the head of the queue, bit 20 its length), 1 target in 2^-16 period, 2 its
 //           velocity and 3 the measured velocity in 2^-16 period/tick, 4 following error in 2^-16
 //           period (flag: above following_limit), 5 command (flag: at its limit), 6 target in 2^-16
-//           motor step (flag: restart there), 7 underrun.
+//           motor step (flag: restart there), 7 underrun. The integral of the servo comes before each
+//           command, with a strobe of its own, in 2^-16 command.
 //           A setting is written within 100 cycles between two ticks, and before the next axis is
 //           served during a tick. While there is nothing to do, the program stays at one line.
 // limits    The build stops if the axes need more than TICK_CYCLES. Settings keep these units:
@@ -81,6 +82,7 @@ module motion_engine #(
     output logic        [   AXES-1:0] waits,                   // level: a request is not done yet
     // results
     output logic                      result_valid,            // strobe: result is new
+    output logic                      integral_valid,          // strobe: result is the integral
     output logic        [        2:0] result_axis,             // number of its axis
     output logic        [        2:0] result_kind,             // number of what it is
     output logic signed [       47:0] result,                  // value
@@ -346,7 +348,8 @@ module motion_engine #(
             default:      ;
         endcase
         for (int n = 0; n <= 20; n++) if (sets && named[n]) flags[n] <= !action_e[5];
-        result_valid <= action_e[7:5] == GIVE;
+        result_valid <= action_e[7:5] == GIVE && !action_e[3];
+        integral_valid <= action_e[7:5] == GIVE && action_e[3];
         if (action_e[7:5] == GIVE) begin
             result      <= sum[47:0];
             result_axis <= axis;
@@ -378,7 +381,8 @@ module motion_engine #(
             source <= '0;
             {word, word_e} <= '1;
             {effect, effect_e} <= '0;
-            {filter, flags, period, quiet, ready, result_valid, setting_waits} <= '0;
+            {filter, flags, period, quiet, ready, setting_waits} <= '0;
+            {result_valid, integral_valid} <= '0;
             elapsed <= 24'd1;
         end
     end

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// tick_recorder -- record chosen signals of one axis at each servo tick, evenly, into a block
-// memory, from before a trigger on, so that a host can read them in its own time; or without end,
-// while the host reads.
+// tick_recorder -- record chosen signals of axes at each servo tick, evenly, into a block memory,
+// from before a trigger on, so that a host can read them in its own time; or without end, while the
+// host reads.
 //
 // latency  1 cycle from the last result of a sample to phase and available; 2 cycles from there to
 //          the first word and from read to the next word, and one more for each word that is stored
 //          meanwhile
 // rate     one word per cycle while it records; one word per 2 cycles while it is read
-// behaviour A sample begins at a tick and ends with the command of that tick. Its words are in the
-//          order of the bits of signals. Numbers 1 to 5 are results; the others, and 1 and 2 while
-//          there are none, are taken in the cycles after the tick that have no result.
+// behaviour A sample begins at a tick and ends with the command of the last axis. It has one word
+//          of each channel, in their order. Signals 1 to 6 are results, 6 is the integral; the
+//          others, and 1 and 2 while there are none, are taken one after the other in the cycles
+//          after the tick that have no result of a channel. Of two channels that are the same only
+//          the first one has the results.
 //          The trigger looks at one signal of each sample once there are `earlier` samples: mode 0
 //          always, 1 it rises to level, 2 it falls below it, 3 its size reaches level, 4 it has a
 //          bit of level. Without delay that sample follows the `earlier` ones; with delay it is the
@@ -23,15 +25,16 @@
 `default_nettype none
 
 module tick_recorder #(
+    parameter int AXES  = 1,    // axes of the engine, 1 to 8
     parameter int WORDS = 4096  // words of the memory, a power of two, 16 to 65536
 ) (
     input  wire         clk,
     input  wire         rst,
     // settings
     input  wire         start,           // strobe: record from now on
-    input  wire  [ 2:0] axis,            // number of the axis
-    input  wire  [ 9:0] signals,         // bit n: record signal n
-    input  wire  [ 3:0] trigger_signal,  // number of the signal of the trigger
+    input  wire  [ 2:0] last,            // number of the last channel
+    input  wire  [63:0] channels,        // a byte each: signal 4 bits, number of its axis 3 bits
+    input  wire  [ 7:0] trigger,         // what triggers, in the same way
     input  wire  [ 2:0] trigger_mode,    // how it triggers
     input  wire  [31:0] level,           // of the trigger, signed
     input  wire  [15:0] length,          // samples; 0: no end
@@ -41,6 +44,7 @@ module tick_recorder #(
     // what is recorded
     input  wire         tick,            // strobe: servo tick
     input  wire         ready,           // level: the sample after a delay may begin
+    output logic [ 2:0] seen_axis,       // number of the axis of these levels
     input  wire  [31:0] sine_cosine,     // samples of the axis, cosine in the upper half
     input  wire  [31:0] target,          // the last result 1 of the axis
     input  wire  [31:0] position,        // 2^-16 period, low word
@@ -48,6 +52,7 @@ module tick_recorder #(
     input  wire  [31:0] fine_command,    // full scale 2^15, signed
     input  wire  [31:0] faults,          // bits as in axis_registers.faults
     input  wire         valid,           // strobe: result is new
+    input  wire         integral_valid,  // strobe: result is the integral
     input  wire  [ 2:0] result_axis,     // number of its axis
     input  wire  [ 2:0] kind,            // number of what it is
     input  wire  [31:0] result,          // its lower half
@@ -64,57 +69,80 @@ module tick_recorder #(
     end
 
     localparam [2:0] COMMAND = 3'd5;  // kind of result, as in tables/engine_microcode.py
-    localparam [2:0] TAKEN = 3'd7;  // signals that are taken
+    // signals
+    localparam [3:0] VELOCITY = 4'd2, INTEGRAL = 4'd6;
+    // bits 3, 1 and 0 of the signals that are taken
+    localparam [2:0] SINE_COSINE = 3'd0, TARGET = 3'd1, NO_VELOCITY = 3'd2, POSITION = 3'd3;
+    localparam [2:0] PHASE = 3'd4, FINE_COMMAND = 3'd5;
+    localparam int TRIGGER = 8, NONE = 9;  // entries after the channels
     localparam [1:0] EMPTY = 2'd0, WAITING = 2'd1, RECORDING = 2'd2, FULL = 2'd3;
     localparam [2:0] ALWAYS = 3'd0, RISES = 3'd1, FALLS = 3'd2, BEYOND = 3'd3, BITS = 3'd4;
     localparam int A = $clog2(WORDS);
 
-    // number of signals below this one
-    function [3:0] ones(input [9:0] bits);
-        ones = '0;
-        for (int n = 0; n < 10; n++) ones = ones + 4'(bits[n]);
+    // the entry of which `take` has the bit
+    function [6:0] picked(input [79:0] entries, input [9:0] take);
+        picked = '0;
+        for (int n = 0; n < 10; n++) picked = picked | (entries[8*n+:7] & {7{take[n]}});
+    endfunction
+
+    // the lowest bit of those that match, or else the one that is taken
+    function [3:0] number_of(input [9:0] match, input [9:0] take);
+        number_of = '0;
+        for (int n = 0; n < 10; n++) if (take[n]) number_of = number_of | 4'(n);
+        for (int n = 9; n >= 0; n--) if (match[n]) number_of = 4'(n);
     endfunction
 
     logic [31:0] memory[0:WORDS-1];
     logic [A-1:0] base, at;  // first word of the sample; word that is read
     logic [16:0] used;  // words of complete samples that are kept
     logic [15:0] kept, passed, left;  // samples; ticks since the last one, and of the delay
-    logic [2:0] take;  // the next signal that is taken; TAKEN: none
-    logic [1:0] got;  // results 1 and 2 have come in this sample
+    logic [9:0] take;  // one bit: the entry that is taken next
+    logic [9:0] got;  // entries of which results have come in this sample
     logic begun, sampling, delaying;  // there is a sample; it is not complete; the delay runs
     logic [31:0] watched;  // signal of the trigger
     logic known, was_above;  // it was seen in a sample; it was above the level
 
     // the words of a sample
-    wire          active = phase == WAITING || phase == RECORDING;
-    wire          over = delaying ? left <= 16'd1 && ready : !begun || passed + 1'b1 >= every;
-    wire          due = active && tick && over;
-    wire          given = valid && sampling && result_axis == axis && kind != '0 && kind <= COMMAND;
-    wire          taken = sampling && !given && take != TAKEN;
-    wire  [  3:0] number = given ? 4'(kind) : take < 3'd3 ? 4'(take) : 4'(take) + 4'd3;
-    wire          stale = taken && |(got &{number == 4'd2, number == 4'd1});
-    wire          new_value = !due && !stale && (given || taken);
-    wire  [  9:0] chosen = 10'd1 << number;
-    wire  [A-1:0] place = base + A'(ones(signals & (chosen - 1'b1)));
-    wire          keep = new_value && |(signals & chosen);
+    wire        active = phase == WAITING || phase == RECORDING;
+    wire        over = delaying ? left <= 16'd1 && ready : !begun || passed + 1'b1 >= every;
+    wire        due = active && tick && over;
+    wire        counted = valid && kind != '0 && kind <= COMMAND;
+    wire [ 3:0] number = integral_valid ? INTEGRAL : 4'(kind);
+    wire [79:0] entries = {8'd0, trigger, channels};
+    wire [ 6:0] entry = picked(entries, take);
+    wire [ 9:0] match;  // entries that the result belongs to
+    for (genvar n = 0; n < 10; n++) begin : g_match
+        assign match[n] = sampling && (counted || integral_valid) &&
+                          entries[8*n+:7] == {result_axis, number};
+    end
+    wire  [  3:0] index = number_of(match, take);  // entry whose value is new
+    wire          given = |match;
+    wire          taken = sampling && !given && !take[NONE];
+    wire          is_level = entry[3:0] <= VELOCITY || entry[3:0] > INTEGRAL;
+    wire          new_value = !due && (given || taken && is_level && (got & take) == '0);
+    wire  [A-1:0] place = base + A'(index);
+    wire          keep = new_value && index <= 4'(last);
 
+    wire  [  2:0] level_of = {entry[3], entry[1:0]};
     logic [ 31:0] value;
     always_comb begin
-        case (take)
-            3'd0: value = sine_cosine;
-            3'd1: value = target;
-            3'd2: value = '0;  // velocity of a target that does not move
-            3'd3: value = position;
-            3'd4: value = interpolated;
-            3'd5: value = fine_command;
-            default: value = faults;
+        case (level_of)
+            SINE_COSINE:  value = sine_cosine;
+            TARGET:       value = target;
+            NO_VELOCITY:  value = '0;  // of a target that does not move
+            POSITION:     value = position;
+            PHASE:        value = interpolated;
+            FINE_COMMAND: value = fine_command;
+            default:      value = faults;
         endcase
         if (given) value = result;
     end
 
+    assign seen_axis = entry[6:4];
+
     // the trigger, at the end of a sample
-    wire         ends = given && kind == COMMAND && !due;
-    wire  [31:0] seen = trigger_signal == 4'(COMMAND) ? value : watched;
+    wire         ends = sampling && valid && kind == COMMAND && result_axis == 3'(AXES - 1) && !due;
+    wire  [31:0] seen = match[TRIGGER] ? value : watched;
     wire         above = $signed(seen) >= $signed(level);
     wire         below = $signed(seen) <= -$signed(level);
     logic        hits;
@@ -128,12 +156,12 @@ module tick_recorder #(
         endcase
     end
     // the end of a sample
-    wire [16:0] each = 17'(ones(signals));
+    wire [16:0] each = 17'(last) + 1'b1;
     wire        fits = used + each + each <= 17'(WORDS);  // this sample and one more
     wire        ripe = kept == earlier || !fits;
     wire        counts = phase == RECORDING || delaying || hits && ripe && delay == '0;
     wire        drops = ends && !counts && ripe;  // the oldest sample
-    wire        last = !fits || length != '0 && kept + 1'b1 >= length;
+    wire        complete = !fits || length != '0 && kept + 1'b1 >= length;
     wire        passes = read && available != '0;
 
     assign available = phase == FULL || phase == RECORDING && length == '0 ? used : '0;
@@ -150,22 +178,21 @@ module tick_recorder #(
             passed <= due ? '0 : passed + 1'b1;
             if (left > 16'd1) left <= left - 1'b1;
         end
-        if (taken) take <= take + 1'b1;
-        if (given && kind == 3'd1) got[0] <= 1'b1;
-        if (given && kind == 3'd2) got[1] <= 1'b1;
-        if (new_value && number == trigger_signal) watched <= value;
+        if (taken) take <= take << 1;
+        got <= got | match;
+        if (new_value && (given ? match[TRIGGER] : take[TRIGGER])) watched <= value;
         if (ends) begin
             sampling <= 1'b0;
             {known, was_above} <= {1'b1, above};
             base <= base + each[A-1:0];
             if (!drops) kept <= kept + 1'b1;
-            if (counts) phase <= last ? FULL : RECORDING;
+            if (counts) phase <= complete ? FULL : RECORDING;
             delaying <= !counts && hits && ripe;
             if (hits && !delaying) left <= delay;
         end
         if (due) begin
             {begun, sampling} <= 2'b11;
-            take <= '0;
+            take <= 10'd1;
             got  <= '0;
         end
         used <= used + (ends && !drops ? each : '0) - 17'(passes);
@@ -179,6 +206,7 @@ module tick_recorder #(
             kept   <= '0;
             passed <= '0;
             left   <= '0;
+            watched <= '0;
         end
         if (rst) begin
             phase <= EMPTY;
@@ -194,7 +222,7 @@ module tick_recorder #(
         past <= 1'b1;
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
-            assume (start || signals == $past(signals));
+            assume (start || last == $past(last));
             assert (!keep || active);
             assert (!active || base == A'(at + used[A-1:0]));
             assert (used <= 17'(WORDS) && available <= used);

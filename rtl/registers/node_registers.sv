@@ -39,22 +39,6 @@ module node_registers (
     // or until a word of the bus is received [cycle]
     output logic        [23:0] wait_time,
     output logic               wait_time_written,         // strobe: new value
-    output logic        [ 2:0] scope_axis,                // number of the axis
-    output logic        [ 9:0] scope_signals,             // bit n: tick_signal n
-    output logic        [ 3:0] scope_trigger,             // tick_signal that triggers
-    output logic        [ 2:0] scope_mode,                // tick_trigger
-    // samples; 0: no end, and they are read while it goes on
-    output logic        [15:0] scope_samples_length,
-    // from sample to sample; 0 acts as 1 [tick]
-    output logic        [15:0] scope_samples_every,
-    // samples from before the trigger, less than length
-    output logic        [15:0] scope_place_earlier,
-    // from the trigger to the first sample, which also waits for the first value of a waveform; 0:
-    // the sample of the trigger [tick]
-    output logic        [15:0] scope_place_delay,
-    // level of the trigger; writing begins a recording
-    output logic signed [31:0] scope_level,
-    output logic               scope_level_written,       // strobe: new value
     input  wire         [31:0] tick_count,                // servo ticks since reset; wraps [tick]
     output logic        [ 2:0] excitation_axis,           // number of the axis
     // values of the waveform, one for each tick, 4096 at most; 0: nothing is added [tick]
@@ -68,7 +52,26 @@ module node_registers (
     input  wire         [16:0] scope_state_available,     // words that can be read
     // word of the recording; reading advances to the next one
     input  wire         [31:0] scope_word,
-    output logic               scope_word_read            // strobe: read in this cycle
+    output logic               scope_word_read,           // strobe: read in this cycle
+    output logic        [ 2:0] scope_axis,                // number of the axis of the trigger
+    output logic        [ 2:0] scope_last,                // number of the last channel
+    output logic        [ 3:0] scope_trigger,             // tick_signal that triggers
+    output logic        [ 2:0] scope_mode,                // tick_trigger
+    // channels 0 to 3, a byte each: tick_signal in bits 3:0, number of its axis in bits 6:4
+    output logic        [31:0] scope_channels_0,
+    output logic        [31:0] scope_channels_4,          // channels 4 to 7 in the same way
+    // samples; 0: no end, and they are read while it goes on
+    output logic        [15:0] scope_samples_length,
+    // from sample to sample; 0 acts as 1 [tick]
+    output logic        [15:0] scope_samples_every,
+    // samples from before the trigger, less than length
+    output logic        [15:0] scope_place_earlier,
+    // from the trigger to the first sample, which also waits for the first value of a waveform; 0:
+    // the sample of the trigger [tick]
+    output logic        [15:0] scope_place_delay,
+    // level of the trigger; writing begins a recording
+    output logic signed [31:0] scope_level,
+    output logic               scope_level_written        // strobe: new value
 );
     logic [31:0] time_stamp_high;
     logic        get_map_crc;
@@ -85,7 +88,7 @@ module node_registers (
     assign scope_word_read = get_scope_word;
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'h3ABCF55D) | ({32{get_clk_hz}} & clk_hz) |
+    assign rdata = ({32{get_map_crc}} & 32'hA49B4CEA) | ({32{get_clk_hz}} & clk_hz) |
         ({32{get_build}} & {7'd0, build_scope, build_memory, build_address, build_axes}) |
         ({32{get_time_stamp}} & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high) |
         ({32{get_tick_count}} & tick_count) | ({32{get_scope_state}} & {13'd0,
@@ -109,22 +112,24 @@ module node_registers (
         if (put && word == 6'h09) start_axes <= wdata[7:0];
         wait_time_written <= put && word == 6'h0A;
         if (put && word == 6'h0A) wait_time <= wdata[23:0];
-        if (put && word == 6'h0C) scope_axis <= wdata[2:0];
-        if (put && word == 6'h0C) scope_signals <= wdata[17:8];
-        if (put && word == 6'h0C) scope_trigger <= wdata[27:24];
-        if (put && word == 6'h0C) scope_mode <= wdata[30:28];
-        if (put && word == 6'h0D) scope_samples_length <= wdata[15:0];
-        if (put && word == 6'h0D) scope_samples_every <= wdata[31:16];
-        if (put && word == 6'h0E) scope_place_earlier <= wdata[15:0];
-        if (put && word == 6'h0E) scope_place_delay <= wdata[31:16];
-        scope_level_written <= put && word == 6'h0F;
-        if (put && word == 6'h0F) scope_level <= wdata[31:0];
         if (put && word == 6'h18) excitation_axis <= wdata[2:0];
         if (put && word == 6'h18) excitation_period <= wdata[15:3];
         if (put && word == 6'h18) excitation_limit <= wdata[30:16];
         excitation_value_written <= put && word == 6'h19;
         if (put && word == 6'h19) excitation_value <= wdata[15:0];
         if (put && word == 6'h19) excitation_value_at <= wdata[27:16];
+        if (put && word == 6'h1C) scope_axis <= wdata[2:0];
+        if (put && word == 6'h1C) scope_last <= wdata[10:8];
+        if (put && word == 6'h1C) scope_trigger <= wdata[19:16];
+        if (put && word == 6'h1C) scope_mode <= wdata[26:24];
+        if (put && word == 6'h1D) scope_channels_0 <= wdata[31:0];
+        if (put && word == 6'h1E) scope_channels_4 <= wdata[31:0];
+        if (put && word == 6'h1F) scope_samples_length <= wdata[15:0];
+        if (put && word == 6'h1F) scope_samples_every <= wdata[31:16];
+        if (put && word == 6'h20) scope_place_earlier <= wdata[15:0];
+        if (put && word == 6'h20) scope_place_delay <= wdata[31:16];
+        scope_level_written <= put && word == 6'h21;
+        if (put && word == 6'h21) scope_level <= wdata[31:0];
 
         if (rst) begin
             get_map_crc <= 1'b0;
@@ -143,22 +148,24 @@ module node_registers (
             start_axes <= 8'h00;
             wait_time_written <= 1'b0;
             wait_time <= 24'h000000;
-            scope_axis <= 3'h0;
-            scope_signals <= 10'h000;
-            scope_trigger <= 4'h0;
-            scope_mode <= 3'h0;
-            scope_samples_length <= 16'h0001;
-            scope_samples_every <= 16'h0001;
-            scope_place_earlier <= 16'h0000;
-            scope_place_delay <= 16'h0000;
-            scope_level_written <= 1'b0;
-            scope_level <= 32'h00000000;
             excitation_axis <= 3'h0;
             excitation_period <= 13'h0000;
             excitation_limit <= 15'h0000;
             excitation_value_written <= 1'b0;
             excitation_value <= 16'h0000;
             excitation_value_at <= 12'h000;
+            scope_axis <= 3'h0;
+            scope_last <= 3'h0;
+            scope_trigger <= 4'h0;
+            scope_mode <= 3'h0;
+            scope_channels_0 <= 32'h00000000;
+            scope_channels_4 <= 32'h00000000;
+            scope_samples_length <= 16'h0001;
+            scope_samples_every <= 16'h0001;
+            scope_place_earlier <= 16'h0000;
+            scope_place_delay <= 16'h0000;
+            scope_level_written <= 1'b0;
+            scope_level <= 32'h00000000;
         end
     end
 endmodule

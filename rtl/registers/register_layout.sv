@@ -119,10 +119,11 @@ module register_layout #(
         case (entry)
             9'h006, 9'h090: mask = 32'h00FFFFFF;
             9'h007, 9'h013, 9'h04C, 9'h084, 9'h099: mask = 32'h0000FFFF;
-            9'h00C: mask = 32'h7F03FF07;
-            9'h00D, 9'h00E, 9'h00F, 9'h010, 9'h014, 9'h091, 9'h0CF: mask = 32'hFFFFFFFF;
+            9'h010, 9'h014, 9'h01D, 9'h01E, 9'h01F, 9'h020, 9'h021, 9'h091, 9'h0CF: mask =
+                32'hFFFFFFFF;
             9'h011, 9'h015, 9'h050, 9'h102: mask = 32'h000000FF;
             9'h018: mask = 32'h7FFFFFFF;
+            9'h01C: mask = 32'h070F0707;
             9'h040, 9'h08A, 9'h08F, 9'h100: mask = 32'h000FFFFF;
             9'h0C0: mask = (has_drive ? 32'h0000003F : 32'd0);
             9'h0C8, 9'h0ED, 9'h0EF, 9'h0F0, 9'h0F2, 9'h0F3, 9'h0F5, 9'h0F6, 9'h0F7: mask =
@@ -180,7 +181,7 @@ module register_layout #(
             default: sign = '0;
         endcase
         case (entry)
-            9'h00D: first = 32'h00010001;
+            9'h01F: first = 32'h00010001;
             9'h040, 9'h08A, 9'h08F: first = 32'h0000022B;
             9'h04C: first = 32'h000003E8;
             9'h084: first = 32'h0000012C;

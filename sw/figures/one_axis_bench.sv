@@ -50,7 +50,7 @@ module one_axis_bench (
     wire [31:0] tick_count, stream_state, stream_counts;
     wire unused_stream = &{1'b0, tick_count};
     wire step_made, step_down, block_up, block_down, closed_loop, play, arm, controlled_stop;
-    wire hold_target, result_valid, result_flag;
+    wire hold_target, result_valid, integral_valid, result_flag;
     wire [47:0] position, moved_by, result;
     wire [23:0] take_up;
     wire line_start, line_idle, rate_valid, rate_restart, rate_steep, line_stopped;
@@ -123,6 +123,7 @@ module one_axis_bench (
         .request_waits,
         .pending,
         .result_valid,
+        .integral_valid,
         .result_axis,
         .result_kind,
         .result,
@@ -270,7 +271,7 @@ module one_axis_bench (
         chain_overspeed[0], chain_disagreement[0], chain_lost[0]
     };
     wire unused = &{
-        1'b0, chain, address[1:0], tick_period[23:18], settings, result_axis, compare_pulse,
+        1'b0, chain, address[1:0], tick_period[23:18], settings, result_axis, integral_valid, compare_pulse,
         adc_cs_n, adc_sclk, dac_cs_n, dac_sclk, dac_sdi, phase, fine_command, faults
     };
 endmodule

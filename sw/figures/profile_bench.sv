@@ -58,6 +58,7 @@ module profile_bench #(
         .shift_by              (48'd0),
         .waits,
         .result_valid,
+        .integral_valid        (),
         .result_axis           (),
         .result_kind,
         .result,

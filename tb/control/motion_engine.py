@@ -297,7 +297,7 @@ class Axis:
         constant = blocked or not self.moving and abs(error) <= s["dead_band"]
         limit = s["integral_limit"]
         self.integral = between(self.integral + (0 if constant else s["ki"] * error), -limit, limit)
-        total = self.integral >> 8
+        total = integral = self.integral >> 8
         total += s["kp"] * error + s["kd"] * (self.target_velocity - velocity)
         total += s["kv"] * self.target_velocity + s["ka"] * self.target_acceleration
         if lost:
@@ -325,7 +325,11 @@ class Axis:
             self.integral = self.powered = 0
             self.sum = 0 if off else self.command << 16
         saturated = self.limited_up | self.limited_down
-        return [("error", error, too_far), ("command", self.command, saturated)]
+        return [
+            ("error", error, too_far),
+            ("integral", integral),
+            ("command", self.command, saturated),
+        ]
 
     def steps(self, block_up, block_down, lost_off):
         s = self.settings

@@ -47,6 +47,7 @@ class Engine:
         self.dut = dut
         self.falling = FallingEdge(dut.clk)
         self.result_valid, self.overrun = dut.result_valid, dut.overrun  # looked up once
+        self.integral_valid = dut.integral_valid
         self.busy, self.waits = dut.busy, dut.waits
         self.setting_waits = dut.setting_waits
         self.axes = int(dut.AXES.value)
@@ -139,9 +140,9 @@ class Engine:
 
     def collect(self):
         """What the engine gives in this cycle."""
-        if int(self.result_valid.value):
-            dut = self.dut
-            kind = GIVEN[int(dut.result_kind.value)]
+        dut, is_integral = self.dut, int(self.integral_valid.value)
+        if int(self.result_valid.value) or is_integral:
+            kind = "integral" if is_integral else GIVEN[int(dut.result_kind.value)]
             value = dut.result.value.to_signed()
             flag = int(dut.result_flag.value)
             if kind == "state":

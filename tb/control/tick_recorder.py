@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/control/tick_recorder.sv: step() advances one cycle."""
 
-COMMAND = 5
-SIGNALS = 10
-TAKEN = (0, 1, 2, 6, 7, 8, 9)  # signals that are taken, in this order
+TARGET, TARGET_VELOCITY, VELOCITY, ERROR, COMMAND, INTEGRAL = range(1, 7)  # signals
+POSITION, PHASE, FINE_COMMAND, FAULTS, SIGNALS = range(7, 12)
+LEVELS = {  # of the signals that are taken; a target that does not move has no velocity
+    **{0: "sine_cosine", TARGET: "target", TARGET_VELOCITY: None, POSITION: "position"},
+    **{PHASE: "interpolated", FINE_COMMAND: "fine_command", FAULTS: "faults", 11: "faults"},
+    **{12: "interpolated", 13: "fine_command", 14: "faults", 15: "faults"},  # are no signals
+}
+CHANNELS = 8
+TRIGGER = CHANNELS  # entry after the channels
 EMPTY, WAITING, RECORDING, FULL = range(4)
 ALWAYS, RISES, FALLS, BEYOND, BITS = range(5)
 IDLE = dict(
     start=0,
-    axis=0,
-    signals=0,
-    trigger_signal=0,
+    last=0,
+    channels=0,
+    trigger=0,
     trigger_mode=ALWAYS,
     level=0,
     length=1,
@@ -26,6 +32,7 @@ IDLE = dict(
     fine_command=0,
     faults=0,
     valid=0,
+    integral_valid=0,
     result_axis=0,
     kind=0,
     result=0,
@@ -39,63 +46,82 @@ def signed(word):
     return (word + (1 << 31)) % (1 << 32) - (1 << 31)
 
 
+def channel(signal, axis=0):
+    """The byte of a channel."""
+    return axis << 4 | signal
+
+
+def packed(*channels):
+    """The settings of these channels."""
+    return dict(
+        last=len(channels) - 1, channels=sum(one << 8 * n for n, one in enumerate(channels))
+    )
+
+
 class TickRecorder:
-    """step() returns (word, phase, available, triggered) after the cycle; word is None while what
-    was read has not been written.
+    """step() returns (word, phase, available, triggered, seen_axis) after the cycle; word is None
+    while what was read has not been written, seen_axis is None before the first sample.
     """
 
-    def __init__(self, words=4096):
-        self.words, self.memory, self.word = words, [None] * words, None
+    def __init__(self, words=4096, axes=1):
+        self.axes, self.words, self.memory, self.word = axes, words, [None] * words, None
         self.phase = EMPTY
-        self.base = self.at = self.used = self.kept = self.passed = self.left = self.take = 0
+        self.base = self.at = self.used = self.kept = self.passed = self.left = 0
+        self.take = None
         self.begun = self.sampling = self.delaying = self.known = self.was_above = 0
-        self.got, self.watched = set(), None
+        self.got, self.watched = set(), 0
+
+    def entries(self, i):
+        """The channels and what triggers, by signal and axis."""
+        codes = [i["channels"] >> 8 * n & 0x7F for n in range(CHANNELS)] + [i["trigger"] & 0x7F]
+        return [(code & 15, code >> 4) for code in codes]
+
+    def seen_axis(self, i):
+        """The axis whose levels are taken next."""
+        if self.take is None:
+            return None
+        return self.entries(i)[self.take][1] if self.take <= TRIGGER else 0
 
     def step(self, **inputs):
         i = IDLE | inputs
-        active, each = self.phase in (WAITING, RECORDING), i["signals"].bit_count()
+        active, each = self.phase in (WAITING, RECORDING), i["last"] + 1
         if self.delaying:
             over = self.left <= 1 and i["ready"]
         else:
             over = not self.begun or (self.passed + 1) % 65536 >= i["every"]
         due = active and i["tick"] and over
-        given = (
-            i["valid"]
-            and self.sampling
-            and i["result_axis"] == i["axis"]
-            and 1 <= i["kind"] <= COMMAND
-        )
-        taken = self.sampling and not given and self.take < len(TAKEN)
-        number = value = None
-        if given:
-            number, value = i["kind"], i["result"]
-        elif taken:
-            number = TAKEN[self.take]
-            taken_values = (
-                *(i["sine_cosine"], i["target"], 0, i["position"]),
-                *(i["interpolated"], i["fine_command"], i["faults"]),
-            )
-            value = taken_values[self.take]
-        new_value = not due and number is not None and not (taken and number in self.got)
-        ends = given and i["kind"] == COMMAND and not due
+        counted = i["valid"] and 1 <= i["kind"] <= COMMAND
+        number = INTEGRAL if i["integral_valid"] else i["kind"]
+        entries, match = self.entries(i), set()
+        if self.sampling and (counted or i["integral_valid"]):
+            match = {n for n, entry in enumerate(entries) if entry == (number, i["result_axis"])}
+        taken = self.sampling and not match and self.take <= TRIGGER
+        index = value = None
+        if match:
+            index, value = min(match), i["result"]
+        elif taken and entries[self.take][0] in LEVELS and self.take not in self.got:
+            name = LEVELS[entries[self.take][0]]
+            index, value = self.take, i[name] if name else 0
+        if due:
+            index = None
+        last_axis = i["result_axis"] == self.axes - 1
+        ends = self.sampling and i["valid"] and i["kind"] == COMMAND and last_axis and not due
         hits = above = False
         if ends:
-            seen = value if i["trigger_signal"] == COMMAND else self.watched
-            if seen is not None:
-                above = signed(seen) >= signed(i["level"])
-                hits = {
-                    RISES: self.known and above and not self.was_above,
-                    FALLS: self.known and not above and self.was_above,
-                    BEYOND: above or signed(seen) <= signed(-signed(i["level"])),
-                    BITS: seen & i["level"] != 0,
-                }.get(i["trigger_mode"], False)
-            hits = hits or i["trigger_mode"] == ALWAYS
+            seen = value if TRIGGER in match else self.watched
+            above = signed(seen) >= signed(i["level"])
+            hits = {
+                ALWAYS: True,
+                RISES: self.known and above and not self.was_above,
+                FALLS: self.known and not above and self.was_above,
+                BEYOND: above or signed(seen) <= signed(-signed(i["level"])),
+                BITS: seen & i["level"] != 0,
+            }.get(i["trigger_mode"], False)
         readable = self.available(i["length"])
         passes = i["read"] and readable
 
-        if new_value and i["signals"] >> number & 1:
-            below = (i["signals"] & (1 << number) - 1).bit_count()
-            self.memory[(self.base + below) % self.words] = value
+        if index is not None and index <= i["last"]:
+            self.memory[(self.base + index) % self.words] = value
         else:
             self.word = self.memory[self.at]
 
@@ -106,10 +132,10 @@ class TickRecorder:
         if active and i["tick"]:
             self.passed = 0 if due else (self.passed + 1) % 65536
             self.left -= self.left > 1
-        self.take += bool(taken)
-        if given and number in (1, 2):
-            self.got.add(number)
-        if new_value and number == i["trigger_signal"]:
+        if taken:
+            self.take += 1
+        self.got |= match
+        if index is not None and (TRIGGER in match if match else index == TRIGGER):
             self.watched = value
         if ends:
             self.sampling, self.known, self.was_above = 0, True, above
@@ -133,6 +159,7 @@ class TickRecorder:
             self.phase = WAITING
             self.begun = self.sampling = self.delaying = self.known = 0
             self.base = self.at = self.used = self.kept = self.passed = self.left = 0
+            self.watched = 0
         if i["rst"]:
             self.phase, self.used = EMPTY, 0
             self.begun = self.sampling = self.delaying = self.known = 0
@@ -141,6 +168,7 @@ class TickRecorder:
             self.phase,
             self.available(i["length"]),
             int(self.phase == RECORDING or bool(self.delaying)),
+            self.seen_axis(i),
         )
 
     def available(self, length):

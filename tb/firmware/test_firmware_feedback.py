@@ -455,3 +455,45 @@ def test_the_burst_of_the_calibration_cannot_be_read_by_the_host():
         == "no_such_register"
     )
     assert machine.ask("read_register", address=address("CAPTURE_STATE"))["value"] == 0
+
+
+NEEDS = {  # (register, value): what is not built without it
+    ("STROBES", "STROBES_COMPARE_ARM_MASK"): "compare",
+    ("STROBES", "STROBES_COMPARE_DISARM_MASK"): "compare",
+    ("STROBES", "STROBES_CAPTURE_NOW_MASK"): "capture",
+    ("STROBES", "STROBES_ARM_INDEX_MASK"): None,
+    ("CAPTURE_SOURCES", 1): None,  # the index
+    ("CAPTURE_SOURCES", 2): "capture",
+    ("CAPTURE_SOURCES", 3): "capture",
+    ("INDEX", 1): None,
+    ("CAPTURE_STATE", 0): None,
+    ("COUNTS_PER_REVOLUTION", 7): "encoder_check",
+    ("COMPARE_START_LOW", 7): "compare",
+    ("COMPARE_STATE", 0): "compare",
+}
+
+
+@pytest.mark.parametrize("absent", ["compare", "capture", "encoder_check"])
+def test_a_register_of_what_is_not_built_is_refused_and_all_others_are_written(absent):
+    machine = CompiledNode(absent=[absent])
+    channel = machine.feedback_channels[0]
+    for (name, value), feature in NEEDS.items():
+        number = DEFINES[f"FEEDBACK_{value}"] if isinstance(value, str) else value
+        channel.strobes.clear()
+        channel.word[DEFINES[f"FEEDBACK_{name}"]] = 0
+        cause = machine.request("write_register", address=address(name), value=number)[0]
+        assert cause == ("not_built" if feature == absent else "ok"), (name, value)
+        if name == "STROBES":
+            assert (number in channel.strobes) == (feature != absent), value
+        elif name != "CAPTURE_STATE" and name != "COMPARE_STATE":  # writing 1 clears a bit of these
+            assert channel.word[DEFINES[f"FEEDBACK_{name}"]] == number * (feature != absent)
+
+
+def test_a_strobe_that_needs_two_features_is_refused_without_either():
+    strobes = sum(
+        DEFINES[f"FEEDBACK_STROBES_{name}_MASK"] for name in ("COMPARE_ARM", "CAPTURE_NOW")
+    )
+    for absent in ("compare", "capture"):
+        machine = CompiledNode(absent=[absent])
+        entry = dict(address=address("STROBES"), value=strobes)
+        assert machine.request("write_register", **entry)[0] == "not_built"

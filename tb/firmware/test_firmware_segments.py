@@ -171,3 +171,40 @@ def test_points_have_their_sign():
         (1 << 23) - 1,
         -(1 << 23) + 1,
     ]
+
+
+def test_each_axis_has_a_table_and_a_use_of_its_own():
+    machine = CompiledNode(*(Axis(position=5 * PERIOD) for _ in range(3)))
+    for axis in range(3):
+        machine.ask("set_parameter", axis=axis, parameter=PARAMETER["home_method"]["id"], value=37)
+        machine.ask("enable", axis=axis, on=1)
+        machine.ask("home", axis=axis)
+    machine.run(300)
+    for axis in (2, 0):
+        machine.ask("set_segments", **{**block(point=axis + 1, points=2), "axis": axis})
+        for name, value in dict(segment_count=1, segment_length=LENGTH, segments=1).items():
+            entry = dict(axis=axis, parameter=PARAMETER[name]["id"], value=value)
+            machine.ask("set_parameter", **entry)
+    machine.poll(8)
+    channels = machine.feedback_channels
+    assert [channel.use is not None for channel in channels] == [True, False, True]
+    assert [channels[axis].segments[0] for axis in (0, 2)] == [1, 3]
+    loaded = [machine.ask("segments", axis=axis)["loaded"] for axis in range(3)]
+    assert loaded == [2, 0, 2]
+
+
+def test_a_table_that_is_to_be_in_force_but_is_not_yet_is_not_changed():
+    machine = CompiledNode(Axis(position=0))  # without a zero
+    table(machine, segments=1)
+    assert state(machine)[1] == 0
+    assert machine.request("set_segments", **block())[0] == "segments_in_use"
+
+
+def test_a_restart_of_the_firmware_takes_the_table_out_of_force():
+    machine = homed()
+    table(machine, segments=1)
+    machine.poll(4)
+    machine.feedback_channels[0].uses.clear()
+    machine.firmware.segments_start(1)
+    assert machine.feedback_channels[0].uses == [None]
+    assert state(machine)[:2] == (0, 0)

@@ -7,9 +7,8 @@ import pytest
 
 from twin.compiled.node import DEFINES, FAULT, PERIOD, TABLE, Axis, CompiledNode
 
-NUMBER = {name: bit for name, (bit, _) in TABLE["tick_signal"].items()}
-SIGNAL = {name: 1 << bit for name, bit in NUMBER.items()}
-TRIGGER = {name: code << 4 for name, (code, _) in TABLE["tick_trigger"].items()}
+SIGNAL = {name: code for name, (code, _) in TABLE["tick_signal"].items()}
+MODE = {name: code for name, (code, _) in TABLE["tick_trigger"].items()}
 STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}
 WORDS, AT_ONCE, VALUES = 1024, 14, 24
 LIMIT = 12345
@@ -26,11 +25,14 @@ def machine():
     return made
 
 
-def record(machine, signals=SIGNAL["error"], every=1, samples=100, axis=0, **settings):
-    settings = dict(trigger=0, earlier=0, delay=0, level=0) | settings
-    return machine.request(
-        "record_ticks", axis=axis, signals=signals, every=every, samples=samples, **settings
-    )[0]
+def record(machine, channels=("error",), every=1, samples=100, axis=0, **settings):
+    """Channels are names of signals of this axis, or (name, axis)."""
+    pairs = [(one, axis) if isinstance(one, str) else one for one in channels]
+    codes = [SIGNAL[name] | number << 4 for name, number in pairs]
+    settings = dict(trigger=0, mode=0, earlier=0, delay=0, level=0) | settings
+    settings |= {f"channel_{n}": code for n, code in enumerate(codes + [0] * (8 - len(codes)))}
+    settings |= dict(axis=axis, last=len(codes) - 1, every=every, samples=samples)
+    return machine.request("record_ticks", **settings)[0]
 
 
 def state(machine):
@@ -59,7 +61,7 @@ def period(machine):
 def test_a_record_has_each_signal_of_each_sample_in_order(machine):
     assert state(machine) == "empty"
     machine.ask("move", axis=1, target=3 * PERIOD)
-    assert record(machine, SIGNAL["target"] | SIGNAL["error"], 2, 50, axis=1) == "ok"
+    assert record(machine, ("target", "error"), 2, 50, axis=1) == "ok"
     assert state(machine) == "waiting" and machine.scope.field("SCOPE_AXIS") == 1
     machine.run(2)
     assert state(machine) == "recording" and machine.ask("read_ticks")["count"] == 0
@@ -67,20 +69,21 @@ def test_a_record_has_each_signal_of_each_sample_in_order(machine):
     assert state(machine) == "full"
     # reading the state has passed the first words
     assert machine.ask("read_ticks")["first"] == AT_ONCE
-    assert record(machine, SIGNAL["target"] | SIGNAL["error"], 2, 50, axis=1) == "ok"
+    assert record(machine, ("target", "error"), 2, 50, axis=1) == "ok"
     machine.run(30)
     got = words(machine)
     assert len(got) == 100 and got == machine.scope.recorded
 
 
 def test_every_setting_of_a_recording_reaches_its_register(machine):
-    settings = dict(trigger=NUMBER["faults"] | TRIGGER["bits"], earlier=3, delay=7, level=-5)
-    assert record(machine, 0x3A5, 9, 77, axis=1, **settings) == "ok"
+    settings = dict(trigger=SIGNAL["faults"], mode=MODE["bits"], earlier=3, delay=7, level=-5)
+    channels = ("error", ("command", 0), "integral", ("faults", 0), ("phase", 0), "position")
+    assert record(machine, channels, 9, 77, axis=1, **settings) == "ok"
     fields = dict(
         SCOPE_AXIS=1,
-        SCOPE_SIGNALS=0x3A5,
-        SCOPE_TRIGGER=NUMBER["faults"],
-        SCOPE_MODE=TABLE["tick_trigger"]["bits"][0],
+        SCOPE_LAST=5,
+        SCOPE_TRIGGER=SIGNAL["faults"],
+        SCOPE_MODE=MODE["bits"],
         SCOPE_SAMPLES_LENGTH=77,
         SCOPE_SAMPLES_EVERY=9,
         SCOPE_PLACE_EARLIER=3,
@@ -88,18 +91,34 @@ def test_every_setting_of_a_recording_reaches_its_register(machine):
     )
     assert {name: machine.scope.field(name) for name in fields} == fields
     assert machine.scope.word[DEFINES["NODE_SCOPE_LEVEL"]] == 0xFFFF_FFFB
+    assert machine.scope.word[DEFINES["NODE_SCOPE_CHANNELS_0"]] == 0x0A16_0514
+    assert machine.scope.word[DEFINES["NODE_SCOPE_CHANNELS_4"]] == 0x1708
     assert record(machine, axis=2) == "no_such_axis"
 
 
 def test_a_recording_waits_for_its_trigger_and_keeps_what_came_before(machine):
-    settings = dict(trigger=NUMBER["faults"] | TRIGGER["bits"], level=FAULT["drive"], earlier=10)
-    assert record(machine, SIGNAL["faults"], samples=20, **settings) == "ok"
+    settings = dict(trigger=SIGNAL["faults"], mode=MODE["bits"], level=FAULT["drive"], earlier=10)
+    assert record(machine, ["faults"], samples=20, **settings) == "ok"
     machine.run(20)
     assert state(machine) == "waiting"
     machine.axes[0].causes |= FAULT["drive"]
     machine.run(10)
     assert state(machine) == "full"
     assert machine.scope.recorded == [0] * 10 + [FAULT["drive"]] * 10
+
+
+def test_one_recording_has_signals_of_both_axes_and_the_trigger_of_one(machine):
+    channels = [("position", 0), ("position", 1), ("faults", 0), ("faults", 1)]
+    settings = dict(trigger=SIGNAL["faults"], mode=MODE["bits"], level=FAULT["drive"])
+    assert record(machine, channels, samples=5, axis=1, **settings) == "ok"
+    machine.axes[0].causes |= FAULT["drive"]
+    machine.run(5)
+    assert state(machine) == "waiting", "the fault of the other axis does not count"
+    machine.axes[1].causes |= FAULT["drive"]
+    machine.run(5)
+    assert state(machine) == "full"
+    places = [axis.position & 0xFFFF_FFFF for axis in machine.axes]
+    assert machine.scope.recorded == 5 * [*places, FAULT["drive"], FAULT["drive"]]
 
 
 def test_a_recording_without_an_end_is_read_while_it_goes_on(machine):

@@ -105,7 +105,8 @@ ARMED = dict(axis=0, trigger=0, before=0, every=4, level=100)
 def test_a_scope_that_only_looks_is_no_motion_and_one_that_drives_is(clients, node):
     begin_to_move(clients, "a")
     assert clients.ask("b", "arm_scope", **ARMED, amplitude=0) == "ok"
-    assert clients.arbiter.moved_by == {(1, 0): "a"} and clients.arbiter.scope_of == {1: "b"}
+    assert clients.arbiter.moved_by == {(1, 0): "a"}
+    assert clients.arbiter.recorder_of == {(1, "arm_scope"): "b"}
     assert clients.ask("b", "arm_scope", **ARMED, amplitude=99) == "other_client"
     clients.ask("a", "stop", axis=0)
     while clients.arbiter.state((1, 0)) in IN_MOTION:
@@ -113,7 +114,7 @@ def test_a_scope_that_only_looks_is_no_motion_and_one_that_drives_is(clients, no
     assert clients.ask("b", "arm_scope", **ARMED, amplitude=99) == "ok"
     assert clients.arbiter.moved_by == {(1, 0): "b"}
     clients.arbiter.depart("b")
-    assert clients.arbiter.scope_of == {}
+    assert clients.arbiter.recorder_of == {}
 
 
 def test_other_axes_are_free():

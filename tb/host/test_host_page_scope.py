@@ -37,7 +37,7 @@ def served(shared):
     (node,) = shared.far.nodes
     shared.wait_until(lambda: node.state() == "off")
     shared.door.bridge.recordings.clear()
-    shared.gateway.arbiter.scope_of.clear()
+    shared.gateway.arbiter.recorder_of.clear()
     node.port.requests.clear()
     yield shared
     node.port.on_request = lambda name, fields: None
@@ -47,7 +47,7 @@ def served(shared):
 
 
 def until(served, *states):
-    served.wait_until(lambda: served.door.bridge.recordings[1].state in states)
+    served.wait_until(lambda: served.door.bridge.recordings[1, "arm_scope"].state in states)
 
 
 def recorded(served, client, **fields):
@@ -147,7 +147,7 @@ def test_a_scope_of_a_client_that_has_left_is_free(served):
 def test_a_scope_may_be_taken_over_and_the_other_client_reads_why_its_record_ended(served):
     with served.stream() as client, served.stream() as other:
         client.request("POST", f"{AXIS}/scope", NEVER)
-        first = served.door.bridge.recordings[1]
+        first = served.door.bridge.recordings[1, "arm_scope"]
         taken = other.request("POST", f"{AXIS}/scope", {**NEVER, "take": True})
         served.wait_until(lambda: first.state == "ended")
         assert first.number < taken["number"]
@@ -207,6 +207,121 @@ def test_a_scope_looks_at_an_axis_that_another_client_moves(served):
         assert found[-1] > found[0]
         assert client.request("GET", AXIS)["moved_by"].startswith("the WebSocket client")
     assert POLL_S < 0.1  # many looks in the shortest record
+
+
+# ------------------------------------------------------------------ recorder of ticks
+
+TICKS = f"{AXIS}/ticks"
+
+
+@pytest.fixture(scope="module")
+def ticking():
+    """A server of a node with a recorder of ticks."""
+    made = Served(homed(axes=2, scope_words=1024))
+    yield made
+    made.end()
+
+
+def ticks_until(server, *states):
+    server.wait_until(lambda: server.door.bridge.recordings[1, "record_ticks"].state in states)
+
+
+def test_a_record_of_ticks_has_samples_before_its_trigger_and_is_what_the_host_reads(ticking):
+    body = {"signals": "target,error,1.error,faults", "samples": 200, "before": 50}
+    body |= {"trigger": "rises", "of": "position", "level": "20um"}
+    with ticking.stream() as client:
+        state = client.request("POST", TICKS, body)
+        assert (state["state"], state["samples"], state["trigger"]) == ("waiting", 200, "rises")
+        client.request("POST", f"{AXIS}/move", {"by": "100 um"})
+        ticks_until(ticking, "full")
+        found = client.request("GET", f"{TICKS}/record")
+    assert found["before"] == 50 and found["time_s"][50] == 0 and len(found["time_s"]) == 200
+    assert found["columns"]["position_nm"][50] >= 20_000 > found["columns"]["position_nm"][49]
+    heading = "time_s,target_nm,error_nm,axis_1_error_nm,faults_bits,position_nm"
+    assert found["csv"].splitlines()[0] == heading and len(found["csv"].splitlines()) == 201
+    assert [*found["columns"]] == [*found["spectrum"]] == heading.split(",")[1:]
+    own = spectrum.spectrum(found["time_s"], found["columns"]["error_nm"])
+    assert found["spectrum"]["error_nm"] == own.amplitude
+
+
+def test_after_a_delay_the_first_sample_of_a_record_of_ticks_is_late(ticking):
+    with ticking.stream() as client:
+        client.request("POST", TICKS, {"samples": 32, "delay": "5ms", "every": "500us"})
+        ticks_until(ticking, "full")
+        found = client.request("GET", f"{TICKS}/record", {"first": 30})
+    assert found["before"] == 0 and found["first"] == 30
+    assert found["time_s"] == pytest.approx([0.005 + 30 * 0.0005, 0.005 + 31 * 0.0005])
+
+
+def test_a_stream_is_shown_while_it_goes_on_and_may_be_ended(ticking):
+    with ticking.stream() as client:
+        body = {"signals": "error", "every": "1ms", "duration": "90s"}
+        assert client.request("POST", TICKS, body)["state"] == "recording"
+        first = len(client.request("GET", f"{TICKS}/record")["time_s"])
+        made = ticking.door.bridge.recordings[1, "record_ticks"]
+        ticking.wait_until(lambda: made.done > first)
+        more = client.request("GET", f"{TICKS}/record", {"first": first})
+        assert more["time_s"][0] == pytest.approx(1e-3 * first) and more["csv"] == ""
+        state = client.request("DELETE", TICKS)
+        assert state["state"] == "full" and state["done"] == state["samples"] < 90_000
+        whole = client.request("GET", f"{TICKS}/record")
+        assert len(whole["time_s"]) == state["samples"] and whole["csv"]
+        assert whole["time_s"] == pytest.approx([1e-3 * n for n in range(state["samples"])])
+        client.request("POST", TICKS, {**body, "duration": "50ms"})
+        ticks_until(ticking, "full")
+        assert len(client.request("GET", f"{TICKS}/record")["time_s"]) == 50
+
+
+def test_what_can_be_recorded_is_listed_and_a_node_without_a_recorder_has_no_words(ticking, served):
+    with ticking.stream() as client:
+        found = client.request("GET", f"{TICKS}/recorder")
+    assert (found["words"], found["axes"], found["channels"]) == (1024, 2, 8)
+    assert found["signals"]["integral"].startswith("integral of the position loop")
+    assert found["tick_s"] == 1 / 4000 and "rises" in found["triggers"]
+    with served.stream() as client:
+        assert client.request("GET", f"{TICKS}/recorder")["words"] == 0
+        with pytest.raises(ServerRefused, match="build it with SCOPE_WORDS"):
+            client.request("POST", TICKS)
+
+
+@pytest.mark.parametrize(
+    "fields, words",
+    [
+        ({"samples": 15}, "0 of 15 samples before the trigger do not fit"),
+        ({"samples": 20, "before": 20}, "20 of 20 samples before the trigger do not fit"),
+        ({"before": -1}, "-1 samples before the trigger"),
+        ({"before": 5, "delay": "1ms"}, "give one of both"),
+        ({"signals": "noise"}, "no signal 'noise' to record"),
+        ({"signals": "2.error"}, "no axis 2"),
+        ({"signals": " , "}, "a recording has 1 to 8 signals"),
+        ({"samples": 9999}, "from 1 to 341"),
+        ({"trigger": "noon"}, "no trigger 'noon'"),
+        ({"trigger": "rises", "level": "1"}, "unit"),
+        ({"duration": "1h"}, "a stream of 43200000 words: from 1 to 100000"),
+        ({"duration": "0s"}, "a stream of 0 words"),
+    ],
+)
+def test_wrong_settings_of_ticks_are_refused_and_leave_the_recorder_free(ticking, fields, words):
+    with ticking.stream() as client, ticking.stream() as other:
+        with pytest.raises(ServerRefused, match=words):
+            client.request("POST", TICKS, fields)
+        other.request("POST", TICKS, {"samples": 16})
+        ticks_until(ticking, "full")
+
+
+def test_a_recorder_of_ticks_belongs_to_one_client_and_the_scope_beside_it_to_another(ticking):
+    never = {"trigger": "bits", "of": "faults"}
+    with ticking.stream() as client, ticking.stream() as other:
+        client.request("POST", TICKS, never)
+        with pytest.raises(ServerRefused, match="recorder of ticks of node 1 waits") as refused:
+            other.request("POST", TICKS, never)
+        assert refused.value.cause == "scope_in_use"
+        other.request("POST", f"{AXIS}/scope", NEVER)
+        assert client.request("GET", TICKS)["state"] == "waiting"
+        assert other.request("POST", TICKS, {**never, "take": True})["state"] == "waiting"
+        with pytest.raises(ServerRefused, match="there is no record"):
+            other.request("GET", f"{TICKS}/record")
+        assert "given up" in other.request("DELETE", TICKS)["words"]
 
 
 # ------------------------------------------------------------------ sine and cosine

@@ -5,12 +5,13 @@ streams, and what is refused; test_firmware_tick_scope has the side of the node.
 
 import io
 
+import numpy
 import pytest
 from PIL import Image
 from pyarrow import parquet
 
 from moire.analysis import tick_scope
-from moire.analysis.tick_scope import NotRecorded, TickScope, Trigger
+from moire.analysis.tick_scope import SIGNALS, NotRecorded, TickScope, Trigger
 from moire.client.bus import Bus
 from moire.errors import OutOfRange, Refused, UnitError
 from moire.made.bus_tables import FAULTS
@@ -52,12 +53,13 @@ def test_signals_are_read_in_their_units_at_equal_distances():
     node = node_of()
     scope = scope_of(node)
     scope.start(("command", "error", "velocity"), 100, "500us")
-    sent = dict(axis=0, signals=0b111000, every=2, samples=100)
-    sent |= dict(trigger=4, earlier=0, delay=0, level=0)
+    sent = dict(axis=0, last=2, every=2, samples=100)
+    sent |= {f"channel_{n}": code for n, code in enumerate((5, 4, 3, 0, 0, 0, 0, 0))}
+    sent |= dict(trigger=4, mode=0, earlier=0, delay=0, level=0)
     assert node.written("record_ticks") == [sent]
     record = scope.read()
     columns = record.columns()
-    assert list(columns) == ["time_s", "velocity_nm_per_s", "error_nm", "command_of_full_scale"]
+    assert list(columns) == ["time_s", "command_of_full_scale", "error_nm", "velocity_nm_per_s"]
     assert columns["time_s"][:3] == pytest.approx([0, 0.0005, 0.001])
     assert len(record.time_s) == 100
     errors = columns["error_nm"] * PERIOD / 800
@@ -95,7 +97,7 @@ def test_position_phase_and_faults_have_their_units():
     scope = scope_of(node_of(Ramp(step=PERIOD // 8)))
     scope.start(["faults", "phase", "position"], 16)
     columns = scope.read().columns()
-    assert list(columns) == ["time_s", "position_nm", "phase_periods", "faults_bits"]
+    assert list(columns) == ["time_s", "faults_bits", "phase_periods", "position_nm"]
     assert columns["position_nm"][1:] - columns["position_nm"][:-1] == pytest.approx([100] * 15)
     assert columns["phase_periods"] == pytest.approx(columns["position_nm"] / 800 % 1)
     assert not columns["faults_bits"].any()
@@ -113,6 +115,7 @@ def test_a_trigger_has_a_level_in_the_unit_of_its_signal_and_samples_before_it()
         ("position", "8um", 10 * PERIOD),
         ("velocity", "3.2mm/s", PERIOD),
         ("command", "-25%", -8192),
+        ("integral", "-25%", -(1 << 29)),
         ("phase", "100", 100),
         ("faults", None, 0),
     ):
@@ -184,7 +187,9 @@ def test_a_stream_that_is_not_read_in_time_ends_with_what_the_memory_holds():
     "wrong, message",
     [
         (dict(signals=["noise"]), "no signal 'noise' to record: there are sine_cosine, target"),
-        (dict(signals=[]), "name a signal"),
+        (dict(signals=[]), "1 to 8 signals, not 0: there are sine_cosine, target"),
+        (dict(signals=[*SIGNALS]), "1 to 8 signals, not 11"),
+        (dict(signals=["y.error"]), "'y' of 'y.error' is no number of an axis: write 1.error"),
         (dict(signals=["error"], samples=WORDS + 1), "from 1 to 1024"),
         (dict(signals=["error"], samples=0), "from 1 to 1024"),
         (dict(signals=["error"], every="100us"), "250us to 16.38"),
@@ -220,11 +225,32 @@ def test_what_was_not_recorded_is_refused():
         scope.read()
 
 
+def test_one_recording_has_signals_of_several_axes_each_in_its_own_unit():
+    node = BusNode(axes=[Ramp(), Ramp(step=PERIOD // 4)], scope_words=WORDS)
+    scope = TickScope(Bus(Rs485Bus(node)).node(1).axis(0))
+    other = scope.node.axis(1)
+    other.set_parameter("period", "400nm")
+    scope.start(("position", "1.position", "1.velocity", "position"), 50)
+    columns = scope.read().columns()
+    assert list(columns) == [
+        *("time_s", "position_nm", "axis_1_position_nm", "axis_1_velocity_nm_per_s")
+    ]
+    assert numpy.diff(columns["position_nm"]) == pytest.approx([50] * 49)
+    assert numpy.diff(columns["axis_1_position_nm"]) == pytest.approx([100] * 49)
+    assert columns["axis_1_velocity_nm_per_s"] == pytest.approx([100 * 4000] * 50)
+    scope.start(("target", "error", "1.error", "1.target"), 9)
+    values = scope.read().values
+    assert [*values][4:] == ["position", "1.position"]
+    assert list(values["1.position"]) == list(values["1.target"] - values["1.error"])
+    with pytest.raises(Refused, match="no axis 2: it has axes 0 to 1"):
+        scope.start(["2.error"])
+
+
 def test_a_recording_of_another_axis_is_not_mistaken_for_its_own():
     node = BusNode(axes=[Ramp(), Ramp()], scope_words=WORDS)
     bus = Bus(Rs485Bus(node))
     TickScope(bus.node(1).axis(1)).start(["error"], 5)
-    with pytest.raises(NotRecorded, match="is of axis 1, not of axis 0"):
+    with pytest.raises(NotRecorded, match="was begun for axis 1, not for axis 0"):
         TickScope(bus.node(1).axis(0)).read()
 
 
@@ -281,4 +307,18 @@ def test_scope_record_and_save_write_files_with_units(tmp_path):
     assert "5 of them before the trigger" in call.out and "1000 words/s without a gap" in call.out
     assert parquet.read_table(table)["time_s"].to_pylist()[5] == 0
     assert len((tmp_path / "b.csv").read_text().splitlines()) == 51
+    call = Call(
+        f"scope record --signals 1.0.error,1.1.velocity,1.command --samples 9 --delay 5ms -- "
+        f"scope save {tmp_path / 'c.csv'}".split(),
+        BusNode(axes=[Ramp(), Ramp()], scope_words=WORDS),
+    )
+    assert call.code == 0, call.err
+    assert "9 samples of error, 1.velocity, 1.command in 2.25ms, 5ms after" in call.out
+    rows = (tmp_path / "c.csv").read_text().splitlines()
+    assert rows[0] == "time_s,error_nm,axis_1_velocity_nm_per_s,axis_1_command_of_full_scale"
+    assert rows[1].startswith("0.005,")
+    wrong = Call("scope record --signals 2.0.error", node_of())
+    assert "axis 2.0 is of node 2: the signals of a recording are of one node" in sentence(wrong, 2)
+    wrong = Call("scope record --before 5 --delay 1ms", node_of())
+    assert "--before and --delay do not go together" in sentence(wrong, 2)
     assert "no signal 'sped'" in sentence(Call("scope record --signals sped", node_of()), 2)

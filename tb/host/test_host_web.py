@@ -41,7 +41,7 @@ AXIS = "/api/nodes/1/axes/0"
 @pytest.fixture(scope="module")
 def shared():
     """For what leaves the axis as it was: at rest, and off once its client has left."""
-    made = Served(homed())
+    made = Served(homed(scope_words=256))
     yield made
     made.end()
 
@@ -81,7 +81,13 @@ def test_every_operation_answers_with_the_fields_that_its_description_promises(s
             client.done("POST", f"{AXIS}/scope", {"trigger": "fault"})
         if operation.name == "scope_record":
             client.done("POST", f"{AXIS}/scope", {"take": True})
-            shared.wait_until(lambda: shared.door.bridge.recordings[1].state == "full")
+            shared.wait_until(lambda: shared.door.bridge.recordings[1, "arm_scope"].state == "full")
+        if operation.name == "give_up_ticks":
+            client.done("POST", f"{AXIS}/ticks", {"trigger": "bits", "of": "faults"})
+        if operation.name == "ticks_record":
+            client.done("POST", f"{AXIS}/ticks", {"take": True, "samples": 16})
+            armed = shared.door.bridge.recordings[1, "record_ticks"]
+            shared.wait_until(lambda: armed.state == "full")
         if operation.name == "hold":
             client.done("POST", f"{AXIS}/jog", body["jog"])
         values = client.done(operation.method, path, body.get(operation.name))

@@ -57,6 +57,14 @@ def shared(browser):
     made.end()
 
 
+@pytest.fixture(scope="module")
+def ticking(browser):
+    """A server of a node of two axes with a recorder of ticks."""
+    made = Served(homed(axes=2, scope_words=1024))
+    yield made
+    made.end()
+
+
 @pytest.fixture
 def served(shared):
     """The drive is off, and nothing has been asked for."""
@@ -101,7 +109,7 @@ def press(page, name):
 
 
 def move(page, text, button="Move to"):
-    page.get_by_label("Move", exact=True).fill(text)
+    page.locator(".axis").first.get_by_label("Move", exact=True).fill(text)
     press(page, button)
 
 
@@ -533,6 +541,72 @@ def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(se
     assert page.evaluate("document.documentElement.scrollWidth") <= 380
     page.set_viewport_size({"width": 1280, "height": 1000})
     box.check()
+
+
+def test_a_record_of_ticks_is_triggered_by_any_signal_and_has_what_came_before(ticking, context):
+    page = opened(context, ticking.door.url)
+    scope = page.locator("#scope")
+    scope.get_by_label("1.position").wait_for(state="attached")
+    scope.get_by_label("target", exact=True).uncheck()
+    for name in ("position", "integral", "faults"):
+        scope.get_by_label(name, exact=True).check()
+    scope.locator("summary").filter(has_text="Signals of axis 1").click()
+    scope.get_by_label("1.error", exact=True).check()
+    scope.locator("[name=trigger]").select_option("rises")
+    scope.locator("[name=of]").select_option("position")
+    scope.get_by_role("textbox", name="Level").fill("50um")
+    scope.locator("[name=share]").select_option("25")
+    scope.locator("[name=count]").fill("160")
+    scope.get_by_role("button", name="Record").click()
+    see(page, "#scope .message", "waiting for the trigger")
+    move(page, "0.3", "Move by")
+    see(page, "#scope .message", "160 samples of axis 1.0, trigger: it rises to the level")
+    with ticking.http() as client:
+        record = client.done("GET", f"{AXIS}/ticks/record")
+    assert record["before"] == 40 and record["time_s"][40] == 0
+    assert [*record["columns"]] == [
+        *("error_nm", "command_of_full_scale", "integral_of_full_scale", "position_nm"),
+        *("faults_bits", "axis_1_error_nm"),
+    ]
+    time_ms = [1e3 * one for one in record["time_s"]]
+    places = [value / 1e6 for value in record["columns"]["position_nm"]]
+    assert page.evaluate(NOT_DRAWN, ["Position", time_ms, places]) == []
+    see(page, "#scope figcaption", "Axis 1 error in µm over ms")
+    see(page, "#scope figcaption", "Integral in % over ms")
+    with page.expect_download() as download:
+        scope.get_by_role("button", name="Export CSV").click()
+    assert download.value.path().read_text() == record["csv"]
+    page.set_viewport_size({"width": 380, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 380
+    page.set_viewport_size({"width": 1280, "height": 1000})
+    page.close()
+
+
+def test_a_stream_is_drawn_while_it_goes_on_until_it_is_ended(ticking, context):
+    page = opened(context, ticking.door.url)
+    scope = page.locator("#scope")
+    scope.get_by_label("1.position").wait_for(state="attached")
+    for name in ("target", "command"):
+        scope.get_by_label(name, exact=True).uncheck()
+    scope.get_by_label("Duration").fill("900s")  # the machine is faster than the clock
+    scope.get_by_label("One every").fill("10ms")
+    scope.get_by_role("button", name="Stream").click()
+    see(page, "#scope figcaption", "Error in µm over ms")
+    drawn = "#scope canvas[data-signal='Error']"
+    first = page.locator(drawn).get_attribute("aria-label")
+    page.locator(f"{drawn}:not([aria-label='{first}'])").wait_for()
+    assert scope.get_by_role("button", name="Export CSV").is_disabled()
+    scope.get_by_role("button", name="End the stream").click()
+    see(page, "#scope .message", "samples of axis 1.0, a stream")
+    with ticking.http() as client:
+        record = client.done("GET", f"{AXIS}/ticks/record")
+    see(page, "#scope .message", f"{len(record['time_s'])} samples")
+    time_ms = [1e3 * one for one in record["time_s"]]
+    errors = [value / 1e3 for value in record["columns"]["error_nm"]]
+    assert page.evaluate(NOT_DRAWN, ["Error", time_ms, errors]) == []
+    scope.locator("[name=view]").select_option("spectrum")
+    see(page, "#scope .note", "Largest line of the error")
+    page.close()
 
 
 def test_the_scope_has_one_owner_who_may_give_it_up_and_another_page_may_take_it(

@@ -5,9 +5,11 @@ of S0 with its servo and its bridge.
 
 import random
 
+import numpy
 import pytest
 
 from experiments.s2_stage import SCALES
+from moire.analysis.tick_scope import TickScope, Trigger
 from moire.client.bus import Bus
 from moire.errors import Refused
 from tb.bench import seed
@@ -26,6 +28,7 @@ NODE = {  # bit n: axis n
     "HAS_COMPARE": 1 << COUNTER,
     "HAS_ENCODER_CHECK": 1 << COUNTER,
     "HAS_FILTERS": 1 << SERVO,
+    "SCOPE_WORDS": 1024,
 }
 BUILT = (
     {"velocity", "drive", "stepper"},
@@ -61,9 +64,27 @@ def test_both_drives_home_and_move_in_one_node(axes):
         axis.request("home")
     for axis in (stepper, servo):
         assert axis.wait().homed, "the index is captured without a queue"
-    for axis, target in ((stepper, "2mm"), (servo, "50um")):
-        ended = axis.move(target)
-        assert ended.ended == "ok" and abs(ended.target_nm - ended.position_nm) < 1000
+    # one recording has signals of all axes, each sample of one tick
+    scope = TickScope(servo)
+    began = Trigger("beyond", "target_velocity", "0.1mm/s", earlier=20)
+    signals = ["target", "target_velocity", "integral"]
+    for axis in (STEPPER, COUNTER):
+        signals += [f"{axis}.target", f"{axis}.target_velocity"]
+    scope.start(signals, 100, trigger=began)
+    stepper.begin_move("2mm")
+    ended = servo.move("50um")
+    assert ended.ended == "ok" and abs(ended.target_nm - ended.position_nm) < 1000
+    ended = stepper.wait()
+    assert ended.ended == "ok" and abs(ended.target_nm - ended.position_nm) < 1000
+    values = scope.read().values
+    for axis in ("", f"{STEPPER}.", f"{COUNTER}."):
+        target, speed = values[f"{axis}target"], values[f"{axis}target_velocity"]
+        assert numpy.abs(numpy.diff(target) - speed[1:]).max() <= 2
+        assert (numpy.count_nonzero(speed) > 30) == (axis != f"{COUNTER}.")
+    speed = numpy.abs(values["target_velocity"])
+    assert speed[19] < began.counts(servo.period_nm, scope.tick_hz) <= speed[20]
+    assert numpy.ptp(values["integral"]) > 0
+    assert len({values[f"{axis}target"][50] for axis in ("", f"{STEPPER}.", f"{COUNTER}.")}) == 3
     axes[COUNTER].status()
     for axis in (stepper, servo):
         axis.disable()

@@ -31,6 +31,8 @@ PARAMETERS = {
     "HAS_DISPLAY": 1,
     "HAS_STATUS_INPUTS": 1,
     "HAS_LINK": 1,
+    "HAS_SET_POINTS": 3,
+    "HAS_BACKLASH": 3,
     "MEMORY_BYTES": 4096,
     "FIRMWARE": '""',
 }

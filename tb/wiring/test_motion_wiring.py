@@ -32,7 +32,6 @@ def test_the_node_reports_what_it_is(node):
 
 def test_each_axis_reports_what_it_is_built_with(node):
     full = dict.fromkeys(node.fields("axis.built"), 1) | {"filters": 2, "segments": 255}
-    full |= {"set_points": 0, "backlash": 0}
     assert node.fields("axis.built", 0) == full
     assert node.fields("axis.built", 1) == full | {"capture": 0}
     assert node.fields("axis.built", 2) == dict.fromkeys(full, 0)
@@ -77,6 +76,118 @@ def test_a_profile_moves_the_target_of_its_axis_at_the_ticks(node, axis):
     assert "moving" not in node.bits("axis.state", axis)
     assert node.read("axis.target", axis=other(axis)) == 0
     assert not node.bits("axis.faults", axis)
+
+
+OFF, PREPARED, STREAMING, EXTRAPOLATING, ENDED = range(5)
+RELEASED, STOPPED, LATE, FAULT = 1, 2, 3, 4
+
+
+def stream(node, axis, ticks=200):
+    """Open a stream of an axis, with wide limits, from where it is."""
+    node.write("axis.strobes", set_target_to_position=1, axis=axis)
+    limits = {"velocity": 1 << 30, "acceleration": 1 << 30}
+    for name, value in limits.items():
+        node.write(f"axis.stream_{name}_limit", value, axis=axis)
+    for register in ("axis.stop_deceleration", "axis.stop_jerk"):
+        node.write(register, 1 << 31, axis=axis)
+    node.write("axis.stream_travel_low", -(1 << 30), axis=axis)
+    node.write("axis.stream_travel_high", 1 << 30, axis=axis)
+    node.write("node.late_limit", ticks)
+    node.write("node.stream_axes", 1 << axis)
+    node.ticks(4)
+
+
+def set_point(node, axis, tick, position, velocity=0):
+    """A set-point at a tick: position in 2^-16 period, velocity in that per tick."""
+    node.write("axis.set_point_position", position, axis=axis)
+    node.write("axis.set_point_velocity", velocity << 8, axis=axis)
+    node.write("node.set_point_tick", tick)
+    node.write("node.set_point_commit", 1 << axis)
+    node.run(TICK // 2)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_an_axis_follows_set_points_until_it_is_released(node, axis):
+    node.start()
+    node.enable(axis)
+    node.ticks(2)
+    assert node.read("axis.stream_state", "mode", axis) == OFF
+    stream(node, axis)
+    assert node.read("axis.stream_state", "mode", axis) == PREPARED
+    first = node.read("node.tick_count") + 20
+    set_point(node, axis, first, 10_000, 1_000)
+    set_point(node, axis, first + 10, 20_000, 1_000)
+    assert node.read("axis.stream_state", "mode", axis) == STREAMING
+    assert node.read("axis.stream_state", "mode", other(axis)) == OFF
+    assert "moving" in node.bits("axis.state", axis)
+    set_point(node, axis, first + 30, 30_000)
+    node.ticks(55)
+    assert abs(node.read("axis.target", axis=axis) - 30_000) <= 1, (
+        "jerk and acceleration are rounded"
+    )
+    assert node.read("axis.target", axis=other(axis)) == 0
+    assert node.fields("axis.stream_counts", axis) == {"accepted": 3, "late": 0, "refused": 0}
+    node.write("node.stream_axes", 0)
+    node.ticks(3)
+    assert node.read("axis.stream_state", "mode", axis) == OFF
+    assert node.read("axis.stream_state", "ended", axis) == RELEASED
+    assert not node.bits("axis.faults", axis)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_stream_without_set_points_goes_on_and_stops_and_a_late_one_is_counted(node, axis):
+    node.start()
+    node.enable(axis)
+    node.ticks(2)
+    stream(node, axis, ticks=30)
+    now = node.read("node.tick_count")
+    set_point(node, axis, now + 20, 10_000, 1_000)
+    node.ticks(28)
+    assert node.read("axis.stream_state", "mode", axis) == EXTRAPOLATING
+    assert node.read("axis.target", axis=axis) > 12_000
+    set_point(node, axis, now + 15, 10_000)
+    assert node.read("axis.stream_counts", "late", axis) == 1
+    node.ticks(40)
+    assert node.read("axis.stream_state", "ended", axis) == LATE
+    assert node.read("axis.stream_state", "extrapolated", axis) >= 20
+    assert "moving" not in node.bits("axis.state", axis)
+
+
+def test_a_stream_ends_in_a_stop_and_needs_a_drive(node):
+    node.start()
+    node.enable(0)
+    node.ticks(2)
+    stream(node, 0)
+    set_point(node, 0, node.read("node.tick_count") + 20, 10_000, 1_000)
+    node.ticks(8)
+    node.write("axis.strobes", controlled_stop=1)
+    node.ticks(8)
+    assert node.read("axis.stream_state", "ended") == STOPPED
+    node.write("node.stream_axes", 0)
+    node.write("axis.control", 0)
+    node.ticks(2)
+    stream(node, 0)
+    assert node.read("axis.stream_state", "mode") == ENDED
+    assert node.read("axis.stream_state", "ended") == FAULT
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_steps_take_the_backlash_up_at_a_reversal(node, axis):
+    node.start()
+    node.write("actuator.drive", 1, axis=axis)
+    node.write("actuator.step_ratio", 40 << 32, axis=axis)
+    node.write("feedback.backlash", 0x8000, axis=axis)
+    node.write("feedback.backlash_rate", value=0, hysteresis=1, axis=axis)
+    node.enable(axis)
+    node.ticks(3)
+    steps = []
+    for velocity in (0x4000, -0x4000, -0x4000):
+        before = node.read("actuator.steps", axis=axis)
+        play(node, axis, velocity, 4)
+        node.ticks(16)
+        steps.append(node.read("actuator.steps", axis=axis) - before)
+    assert steps[1:] == [-60, -40], "20 more in the first motion back"
+    assert node.read("actuator.steps", axis=other(axis)) == 0
 
 
 def test_the_profiles_of_two_axes_start_at_the_same_tick_by_one_write(node):

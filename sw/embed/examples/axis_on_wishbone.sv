@@ -82,7 +82,7 @@ module axis_on_wishbone #(
     wire estop, heartbeat_kick, armed, cpu_stopped, servo_overrun;
     // motion engine
     wire pending, moves, moved, request_waits, step_made, step_down, block_up, block_down;
-    wire closed_loop, play, arm, controlled_stop, hold_target, result_valid, result_flag;
+    wire closed_loop, play, arm, controlled_stop, hold_target, result_valid, integral_valid, result_flag;
     wire [2:0] result_axis, result_kind;
     wire [47:0] position, moved_by, result;
     wire [23:0] take_up;
@@ -284,6 +284,7 @@ module axis_on_wishbone #(
         .request_waits,
         .pending,
         .result_valid,
+        .integral_valid,
         .result_axis,
         .result_kind,
         .result,
@@ -406,7 +407,9 @@ module axis_on_wishbone #(
     );
 
     wire unused_bus = &{1'b0, address[1:0], bus_select, peripherals_select, link_select, wait_time};
-    wire unused_time = &{1'b0, wait_time_written, tick_period[23:18], armed, cycles, result_axis};
+    wire unused_time = &{1'b0, wait_time_written, tick_period[23:18], armed, cycles, result_axis,
+        integral_valid
+    };
     wire unused_chain = &{
         1'b0, chain_setting_written, chain_harmonic_enable, chain_learn, sample_valid, sample_sin,
         sample_cos, quadrature_count

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tick_scope -- records signals of one axis at each servo tick with the recorder of the node, and
-// adds a waveform to the commands of an axis meanwhile, to measure its response.
+// tick_scope -- records signals of axes at each servo tick with the recorder of the node, and adds
+// a waveform to the commands of an axis meanwhile, to measure its response.
 #include "bus/tick_scope.h"
 
 #include "axis/axis.h"
@@ -10,7 +10,7 @@
 
 #define WORDS 14u     // of a reply
 #define VALUES 24u    // of a request
-#define SETTINGS 16u  // bytes of a request to record, which are those of four registers
+#define SETTINGS 24u  // bytes of a request to record, which are those of six registers
 
 static struct {
     uint16_t read;  // words of the recording

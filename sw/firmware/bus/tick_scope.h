@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tick_scope -- records signals of one axis at each servo tick with the recorder of the node, and
-// adds a waveform to the commands of an axis, to measure its response.
+// tick_scope -- records signals of axes at each servo tick with the recorder of the node, and adds
+// a waveform to the commands of an axis, to measure its response.
 //
 // Both need SCOPE_WORDS of rtl/node.sv. The excitation ends with any request to its axis to move,
 // home, stop or switch off, and when the drive is off.

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xFF461A1Eu    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x6244CA52u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -233,17 +233,18 @@ enum bus_scope_state {
     BUS_SCOPE_STATE_FULL = 3,    // complete
 };
 
-enum bus_tick_signal {    // bits
-    BUS_TICK_SIGNAL_SINE_COSINE = 1 << 0,    // samples of sine, lower half, and cosine, upper half
-    BUS_TICK_SIGNAL_TARGET = 1 << 1,    // target, low word, 2^-16 period
-    BUS_TICK_SIGNAL_TARGET_VELOCITY = 1 << 2,    // velocity of the target, 2^-16 period per tick
-    BUS_TICK_SIGNAL_VELOCITY = 1 << 3,    // measured velocity, 2^-16 period per tick
-    BUS_TICK_SIGNAL_ERROR = 1 << 4,    // target - position, 2^-16 period
-    BUS_TICK_SIGNAL_COMMAND = 1 << 5,    // command to the drive, full scale 2^15
-    BUS_TICK_SIGNAL_POSITION = 1 << 6,    // position, low word, 2^-16 period
-    BUS_TICK_SIGNAL_PHASE = 1 << 7,    // interpolated phase, 2^-16 period
-    BUS_TICK_SIGNAL_FINE_COMMAND = 1 << 8,    // command to the fine stage, full scale 2^15
-    BUS_TICK_SIGNAL_FAULTS = 1 << 9,    // latched faults, bits of a fault
+enum bus_tick_signal {
+    BUS_TICK_SIGNAL_SINE_COSINE = 0,    // samples of sine, lower half, and cosine, upper half
+    BUS_TICK_SIGNAL_TARGET = 1,    // target, low word, 2^-16 period
+    BUS_TICK_SIGNAL_TARGET_VELOCITY = 2,    // velocity of the target, 2^-16 period per tick
+    BUS_TICK_SIGNAL_VELOCITY = 3,    // measured velocity, 2^-16 period per tick
+    BUS_TICK_SIGNAL_ERROR = 4,    // target - position, 2^-16 period
+    BUS_TICK_SIGNAL_COMMAND = 5,    // command to the drive, full scale 2^15
+    BUS_TICK_SIGNAL_INTEGRAL = 6,    // integral of the position loop, full scale 2^31
+    BUS_TICK_SIGNAL_POSITION = 7,    // position, low word, 2^-16 period
+    BUS_TICK_SIGNAL_PHASE = 8,    // interpolated phase, 2^-16 period
+    BUS_TICK_SIGNAL_FINE_COMMAND = 9,    // command to the fine stage, full scale 2^15
+    BUS_TICK_SIGNAL_FAULTS = 10,    // latched faults, bits of a fault
 };
 
 enum bus_tick_trigger {
@@ -513,14 +514,15 @@ enum bus_operation {
     // five samples from this one on, 0 after the end; time between two samples in 64 cycles,
     // position: low word
     BUS_OPERATION_READ_SCOPE = 33,
-    // record signals of an axis (bits of a tick_signal) at each servo tick, or one tick in so many.
-    // The trigger is a tick_signal (bits 0 to 3) and a tick_trigger (bits 4 to 6); so many samples
-    // are from before it, or the first one comes so many ticks after it, with the first value of an
-    // excitation. With 0 samples the recording has no end and is read while it goes on. What does
-    // not fit into the memory ends it
+    // record signals of one axis or several at each servo tick, or one tick in so many. A channel
+    // is a tick_signal (bits 0 to 3) of an axis (bits 4 to 6), `last` is the number of the last
+    // channel, and no two channels are the same. The trigger is a tick_signal of `axis` and a
+    // tick_trigger, the mode; so many samples are from before it, or the first one comes so many
+    // ticks after it, with the first value of an excitation. With 0 samples the recording has no
+    // end and is read while it goes on. What does not fit into the memory ends it
     BUS_OPERATION_RECORD_TICKS = 28,
     // progress of that recording (a scope_state), and its next `count` words, in order from `first`
-    // on: for each sample one word of each signal. There are none before it is complete, unless it
+    // on: for each sample one word of each channel. There are none before it is complete, unless it
     // has no end
     BUS_OPERATION_READ_TICKS = 29,
     // values of the waveform of an excitation from this number on, full scale 2^15; nothing is
@@ -821,15 +823,24 @@ enum bus_operation {
 #define BUS_READ_SCOPE_REPLY_ERROR_4 55u    // i32
 #define BUS_READ_SCOPE_REPLY_COMMAND_4 59u    // i16
 #define BUS_READ_SCOPE_REPLY_TIME_4 61u    // u16
-#define BUS_RECORD_TICKS_REQUEST_LENGTH 18u
+#define BUS_RECORD_TICKS_REQUEST_LENGTH 26u
 #define BUS_RECORD_TICKS_REQUEST_AXIS 2u    // u8
-#define BUS_RECORD_TICKS_REQUEST_SIGNALS 3u    // u16
-#define BUS_RECORD_TICKS_REQUEST_TRIGGER 5u    // u8
-#define BUS_RECORD_TICKS_REQUEST_SAMPLES 6u    // u16
-#define BUS_RECORD_TICKS_REQUEST_EVERY 8u    // u16
-#define BUS_RECORD_TICKS_REQUEST_EARLIER 10u    // u16
-#define BUS_RECORD_TICKS_REQUEST_DELAY 12u    // u16
-#define BUS_RECORD_TICKS_REQUEST_LEVEL 14u    // i32
+#define BUS_RECORD_TICKS_REQUEST_LAST 3u    // u8
+#define BUS_RECORD_TICKS_REQUEST_TRIGGER 4u    // u8
+#define BUS_RECORD_TICKS_REQUEST_MODE 5u    // u8
+#define BUS_RECORD_TICKS_REQUEST_CHANNEL_0 6u    // u8
+#define BUS_RECORD_TICKS_REQUEST_CHANNEL_1 7u    // u8
+#define BUS_RECORD_TICKS_REQUEST_CHANNEL_2 8u    // u8
+#define BUS_RECORD_TICKS_REQUEST_CHANNEL_3 9u    // u8
+#define BUS_RECORD_TICKS_REQUEST_CHANNEL_4 10u    // u8
+#define BUS_RECORD_TICKS_REQUEST_CHANNEL_5 11u    // u8
+#define BUS_RECORD_TICKS_REQUEST_CHANNEL_6 12u    // u8
+#define BUS_RECORD_TICKS_REQUEST_CHANNEL_7 13u    // u8
+#define BUS_RECORD_TICKS_REQUEST_SAMPLES 14u    // u16
+#define BUS_RECORD_TICKS_REQUEST_EVERY 16u    // u16
+#define BUS_RECORD_TICKS_REQUEST_EARLIER 18u    // u16
+#define BUS_RECORD_TICKS_REQUEST_DELAY 20u    // u16
+#define BUS_RECORD_TICKS_REQUEST_LEVEL 22u    // i32
 #define BUS_RECORD_TICKS_REPLY_LENGTH 3u
 #define BUS_READ_TICKS_REQUEST_LENGTH 2u
 #define BUS_READ_TICKS_REPLY_LENGTH 63u
@@ -1075,7 +1086,7 @@ enum bus_operation {
     X(arm_scope, 31, 13, 3, 1) \
     X(scope, 32, 2, 6, 0) \
     X(read_scope, 33, 3, 63, 0) \
-    X(record_ticks, 28, 18, 3, 1) \
+    X(record_ticks, 28, 26, 3, 1) \
     X(read_ticks, 29, 2, 63, 0) \
     X(load_excitation, 39, 52, 3, 0) \
     X(excite, 46, 5, 3, 1) \

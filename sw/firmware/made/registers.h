@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x3abcf55du  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xa49b4ceau  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -177,50 +177,6 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_WAIT_TIME_MASK 0x00ffffffu
 #define NODE_WAIT_TIME_SHIFT 0
 #define NODE_WAIT_TIME_WIDTH 24
-// rw: what the recorder of ticks records
-#define NODE_SCOPE 0x030u
-// number of the axis
-#define NODE_SCOPE_AXIS_MASK 0x00000007u
-#define NODE_SCOPE_AXIS_SHIFT 0
-#define NODE_SCOPE_AXIS_WIDTH 3
-// bit n: tick_signal n
-#define NODE_SCOPE_SIGNALS_MASK 0x0003ff00u
-#define NODE_SCOPE_SIGNALS_SHIFT 8
-#define NODE_SCOPE_SIGNALS_WIDTH 10
-// tick_signal that triggers
-#define NODE_SCOPE_TRIGGER_MASK 0x0f000000u
-#define NODE_SCOPE_TRIGGER_SHIFT 24
-#define NODE_SCOPE_TRIGGER_WIDTH 4
-// tick_trigger
-#define NODE_SCOPE_MODE_MASK 0x70000000u
-#define NODE_SCOPE_MODE_SHIFT 28
-#define NODE_SCOPE_MODE_WIDTH 3
-// rw: samples of a recording
-#define NODE_SCOPE_SAMPLES 0x034u
-// samples; 0: no end, and they are read while it goes on
-#define NODE_SCOPE_SAMPLES_LENGTH_MASK 0x0000ffffu
-#define NODE_SCOPE_SAMPLES_LENGTH_SHIFT 0
-#define NODE_SCOPE_SAMPLES_LENGTH_WIDTH 16
-// from sample to sample; 0 acts as 1 [tick]
-#define NODE_SCOPE_SAMPLES_EVERY_MASK 0xffff0000u
-#define NODE_SCOPE_SAMPLES_EVERY_SHIFT 16
-#define NODE_SCOPE_SAMPLES_EVERY_WIDTH 16
-// rw: where the trigger is in a recording
-#define NODE_SCOPE_PLACE 0x038u
-// samples from before the trigger, less than length
-#define NODE_SCOPE_PLACE_EARLIER_MASK 0x0000ffffu
-#define NODE_SCOPE_PLACE_EARLIER_SHIFT 0
-#define NODE_SCOPE_PLACE_EARLIER_WIDTH 16
-// from the trigger to the first sample, which also waits for the first value of a waveform; 0: the
-// sample of the trigger [tick]
-#define NODE_SCOPE_PLACE_DELAY_MASK 0xffff0000u
-#define NODE_SCOPE_PLACE_DELAY_SHIFT 16
-#define NODE_SCOPE_PLACE_DELAY_WIDTH 16
-// rw: level of the trigger; writing begins a recording
-#define NODE_SCOPE_LEVEL 0x03cu
-#define NODE_SCOPE_LEVEL_MASK 0xffffffffu
-#define NODE_SCOPE_LEVEL_SHIFT 0
-#define NODE_SCOPE_LEVEL_WIDTH 32
 // rw: tick_count at which the axes are to be at the set-points that are committed next [tick]
 #define NODE_SET_POINT_TICK 0x040u
 #define NODE_SET_POINT_TICK_MASK 0xffffffffu
@@ -306,6 +262,60 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define NODE_SCOPE_WORD_MASK 0xffffffffu
 #define NODE_SCOPE_WORD_SHIFT 0
 #define NODE_SCOPE_WORD_WIDTH 32
+// rw: what the recorder of ticks records
+#define NODE_SCOPE 0x070u
+// number of the axis of the trigger
+#define NODE_SCOPE_AXIS_MASK 0x00000007u
+#define NODE_SCOPE_AXIS_SHIFT 0
+#define NODE_SCOPE_AXIS_WIDTH 3
+// number of the last channel
+#define NODE_SCOPE_LAST_MASK 0x00000700u
+#define NODE_SCOPE_LAST_SHIFT 8
+#define NODE_SCOPE_LAST_WIDTH 3
+// tick_signal that triggers
+#define NODE_SCOPE_TRIGGER_MASK 0x000f0000u
+#define NODE_SCOPE_TRIGGER_SHIFT 16
+#define NODE_SCOPE_TRIGGER_WIDTH 4
+// tick_trigger
+#define NODE_SCOPE_MODE_MASK 0x07000000u
+#define NODE_SCOPE_MODE_SHIFT 24
+#define NODE_SCOPE_MODE_WIDTH 3
+// rw: channels 0 to 3, a byte each: tick_signal in bits 3:0, number of its axis in bits 6:4
+#define NODE_SCOPE_CHANNELS_0 0x074u
+#define NODE_SCOPE_CHANNELS_0_MASK 0xffffffffu
+#define NODE_SCOPE_CHANNELS_0_SHIFT 0
+#define NODE_SCOPE_CHANNELS_0_WIDTH 32
+// rw: channels 4 to 7 in the same way
+#define NODE_SCOPE_CHANNELS_4 0x078u
+#define NODE_SCOPE_CHANNELS_4_MASK 0xffffffffu
+#define NODE_SCOPE_CHANNELS_4_SHIFT 0
+#define NODE_SCOPE_CHANNELS_4_WIDTH 32
+// rw: samples of a recording
+#define NODE_SCOPE_SAMPLES 0x07cu
+// samples; 0: no end, and they are read while it goes on
+#define NODE_SCOPE_SAMPLES_LENGTH_MASK 0x0000ffffu
+#define NODE_SCOPE_SAMPLES_LENGTH_SHIFT 0
+#define NODE_SCOPE_SAMPLES_LENGTH_WIDTH 16
+// from sample to sample; 0 acts as 1 [tick]
+#define NODE_SCOPE_SAMPLES_EVERY_MASK 0xffff0000u
+#define NODE_SCOPE_SAMPLES_EVERY_SHIFT 16
+#define NODE_SCOPE_SAMPLES_EVERY_WIDTH 16
+// rw: where the trigger is in a recording
+#define NODE_SCOPE_PLACE 0x080u
+// samples from before the trigger, less than length
+#define NODE_SCOPE_PLACE_EARLIER_MASK 0x0000ffffu
+#define NODE_SCOPE_PLACE_EARLIER_SHIFT 0
+#define NODE_SCOPE_PLACE_EARLIER_WIDTH 16
+// from the trigger to the first sample, which also waits for the first value of a waveform; 0: the
+// sample of the trigger [tick]
+#define NODE_SCOPE_PLACE_DELAY_MASK 0xffff0000u
+#define NODE_SCOPE_PLACE_DELAY_SHIFT 16
+#define NODE_SCOPE_PLACE_DELAY_WIDTH 16
+// rw: level of the trigger; writing begins a recording
+#define NODE_SCOPE_LEVEL 0x084u
+#define NODE_SCOPE_LEVEL_MASK 0xffffffffu
+#define NODE_SCOPE_LEVEL_SHIFT 0
+#define NODE_SCOPE_LEVEL_WIDTH 32
 
 // RS-485 bus: 9-bit UART, address filter, frame check, watchdog
 // rw: duration of one bit [1/16 cycle]

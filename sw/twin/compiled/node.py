@@ -509,6 +509,23 @@ class TickScope:
             "bits": value & level != 0,
         }.get(name or "", False)
 
+    @staticmethod
+    def value(axis: "Axis", signal: int) -> int:
+        """A signal of an axis now; these axes have no integral and no fine stage."""
+        return (
+            axis.word.get(DEFINES["AXIS_SAMPLE"], 0),
+            axis.target,
+            0,
+            axis.speed,
+            axis.error,
+            signed(axis.word.get(DEFINES["AXIS_COMMAND"], 0) & 0xFFFF, 16),
+            0,
+            axis.position,
+            axis.position & 0xFFFF,
+            0,
+            axis.faults,
+        )[signal]
+
     def tick(self, axes: Sequence["Axis"]) -> None:
         """A servo tick has passed."""
         if self.phase not in (self.WAITING, self.RECORDING):
@@ -521,23 +538,15 @@ class TickScope:
         elif self.passed < self.field("SCOPE_SAMPLES_EVERY"):
             return
         self.passed = 0
-        axis, d = axes[self.field("SCOPE_AXIS")], DEFINES
-        values = (
-            axis.word.get(d["AXIS_SAMPLE"], 0),
-            axis.target,
-            0,
-            axis.speed,
-            axis.error,
-            signed(axis.word.get(d["AXIS_COMMAND"], 0) & 0xFFFF, 16),
-            axis.position,
-            axis.position & 0xFFFF,
-            0,
-            axis.faults,
-        )
-        chosen = self.field("SCOPE_SIGNALS")
-        sample = [value & 0xFFFFFFFF for bit, value in enumerate(values) if chosen >> bit & 1]
+        codes = (1 << DEFINES["NODE_SCOPE_LAST_WIDTH"]) * [0]
+        for first in range(0, len(codes), 4):
+            word = self.word.get(DEFINES[f"NODE_SCOPE_CHANNELS_{first}"], 0)
+            codes[first : first + 4] = word.to_bytes(4, "little")
+        chosen = codes[: self.field("SCOPE_LAST") + 1]
+        sample = [self.value(axes[code >> 4 & 7], code & 15) & 0xFFFFFFFF for code in chosen]
         earlier, delay = self.field("SCOPE_PLACE_EARLIER"), self.field("SCOPE_PLACE_DELAY")
-        hit = self.triggers(signed(values[self.field("SCOPE_TRIGGER")] & 0xFFFFFFFF, 32))
+        seen = self.value(axes[self.field("SCOPE_AXIS")], self.field("SCOPE_TRIGGER"))
+        hit = self.triggers(signed(seen & 0xFFFFFFFF, 32))
         if self.phase == self.WAITING and self.delay is None:
             ripe = len(self.samples) == earlier
             if not (hit and ripe and delay == 0):

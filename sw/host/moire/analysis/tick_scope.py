@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder of ticks of a node: signals of one axis at each servo tick, evenly spaced, from
-before a trigger on or without end, and an excitation that is added to the commands of an axis.
+"""The recorder of ticks of a node: up to 8 signals of its axes at each servo tick, evenly spaced,
+from before a trigger on or without end, and an excitation that is added to the commands of an axis.
 
     scope = TickScope(axis)
     scope.start(("error", "command"), 4096, trigger=Trigger("beyond", "error", "1um", earlier=400))
@@ -10,6 +10,7 @@ before a trigger on or without end, and an excitation that is added to the comma
 
     for record in scope.stream(("error", "command"), every="1ms", duration="10s"): ...
 
+A signal is one of the axis, as "error", or of another axis of its node, as "1.error" of axis 1.
 Sample n of every signal belongs to the same tick: the position was taken at that tick, and the
 command was computed from it. The node needs SCOPE_WORDS of rtl/node.sv; `moire.analysis.scope` is
 for the others.
@@ -20,6 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
@@ -42,11 +44,11 @@ from moire.made.registers import FIELDS
 
 Array = NDArray[numpy.float64]
 
-SIGNALS = {name: bit for bit, (name, _) in TICK_SIGNALS.items()}
+SIGNALS = {name: code for code, (name, _) in TICK_SIGNALS.items()}
 TRIGGERS = {name: code for code, (name, _) in TICK_TRIGGERS.items()}
 LENGTHS = ("target", "error", "position")  # signals by what they are
 SPEEDS = ("target_velocity", "velocity")
-SHARES = ("command", "fine_command")
+SHARES = {"command": FULL_SCALE, "fine_command": FULL_SCALE, "integral": FULL_SCALE << 16}
 LONGEST_EVERY = 0xFFFF  # ticks from sample to sample
 LONGEST_DELAY = 0xFFFF  # ticks from the trigger to the first sample
 LATE_S = 2.0  # of the node: a recording that lasts so much longer than it should has no servo
@@ -55,9 +57,10 @@ WORDS_AT_ONCE = sum(field.startswith("word_") for field, _ in OPERATIONS["read_t
 VALUES_AT_ONCE = sum(
     field.startswith("value_") for field, _ in OPERATIONS["load_excitation"].request
 )
+CHANNELS = sum(field.startswith("channel_") for field, _ in OPERATIONS["record_ticks"].request)
+AXIS_AT = 4  # bit of a channel, above the number of its signal
 NODE_FIELDS = {f"{f.register}.{f.field}": f for f in FIELDS if f.block == "node"}
 TIME_STAMP = NODE_FIELDS["time_stamp.value"].address()
-TRIGGER_AT = 4  # bit of a trigger, above the number of its signal
 STREAM_SAMPLES = 256  # of a record of a stream, at most about so many
 STREAM_POLL_S = 0.005  # where no sample has come
 
@@ -72,8 +75,8 @@ class TickRecord:
 
     every: int  # ticks from sample to sample
     tick_s: float
-    period_nm: float
-    values: Mapping[str, Array]  # by name of SIGNALS; sine_cosine is split into sine and cosine
+    period_nm: Mapping[str, float]  # by what is before the names of the signals of an axis
+    values: Mapping[str, Array]  # by name of signal; sine_cosine is split into sine and cosine
     first: int = 0  # samples from the trigger to the first one
 
     @property
@@ -84,8 +87,16 @@ class TickRecord:
 
     def columns(self) -> dict[str, Array]:
         """The signals in the units that their names state, after the time."""
-        nm = self.period_nm / COUNTS
-        scales = {
+        named = {"time_s": self.time_s}
+        for name, values in self.values.items():
+            axis, _, signal = name.rpartition(".")
+            column, scale = self.unit(signal, self.period_nm[axis] / COUNTS)
+            named[f"axis_{axis}_{column}" if axis else column] = numpy.asarray(values * scale)
+        return named
+
+    def unit(self, signal: str, nm: float) -> tuple[str, float]:
+        """The name of a signal with its unit, and its LSB in it; `nm` is that of a position."""
+        return {
             "sine": ("sine_counts", 1.0),
             "cosine": ("cosine_counts", 1.0),
             "target": ("target_nm", nm),
@@ -94,15 +105,11 @@ class TickRecord:
             "error": ("error_nm", nm),
             "position": ("position_nm", nm),
             "command": ("command_of_full_scale", 1 / FULL_SCALE),
+            "integral": ("integral_of_full_scale", 1 / SHARES["integral"]),
             "phase": ("phase_periods", 1 / COUNTS),
             "fine_command": ("fine_command_of_full_scale", 1 / FULL_SCALE),
             "faults": ("faults_bits", 1.0),
-        }
-        named = {"time_s": self.time_s}
-        for name, values in self.values.items():
-            column, scale = scales[name]
-            named[column] = numpy.asarray(values * scale, float)
-        return named
+        }[signal]
 
     def csv(self) -> str:
         """The record as CSV, with a heading that names the units."""
@@ -187,7 +194,7 @@ class Trigger:
         elif self.signal in SPEEDS:
             level = units.parse_speed(self.level) * 1_000_000 / lsb_nm / tick_hz
         elif self.signal in SHARES:
-            level = units.parse_signed_share(self.level) * FULL_SCALE
+            level = units.parse_signed_share(self.level) * SHARES[self.signal]
         else:
             level = units.parse_number(self.level)
         if abs(level) >= 1 << 31:
@@ -198,12 +205,24 @@ class Trigger:
 NOW = Trigger()
 
 
+class Channel(NamedTuple):
+    """A signal of an axis."""
+
+    signal: str  # of SIGNALS
+    axis: int  # its number
+
+    @property
+    def code(self) -> int:
+        """The channel as the node has it."""
+        return SIGNALS[self.signal] | self.axis << AXIS_AT
+
+
 @dataclass(frozen=True)
 class Setting:
     """What a recording has."""
 
-    axis: int
-    signals: tuple[str, ...]  # of SIGNALS, in their order
+    axis: int  # of the trigger
+    channels: tuple[Channel, ...]  # in the order of their words
     samples: int  # 0: no end
     every: int  # ticks from sample to sample
     earlier: int = 0  # samples from before the trigger
@@ -212,7 +231,15 @@ class Setting:
     @property
     def words(self) -> int:
         """Words of the recording."""
-        return self.samples * len(self.signals)
+        return self.samples * len(self.channels)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The names of the signals, with the axis before those of another one."""
+        return tuple(
+            one.signal if one.axis == self.axis else f"{one.axis}.{one.signal}"
+            for one in self.channels
+        )
 
 
 class TickScope:
@@ -235,10 +262,15 @@ class TickScope:
 
     def setting(self) -> Setting:
         """The setting of the last recording, whoever began it."""
-        chosen = self.field("scope.signals")
+        words = [self.field(f"scope_channels_{first}.value") for first in (0, 4)]
+        codes = b"".join(word.to_bytes(4, "little") for word in words)
+        names = {code: name for name, code in SIGNALS.items()}
         return Setting(
             self.field("scope.axis"),
-            tuple(name for name, bit in SIGNALS.items() if chosen >> bit & 1),
+            tuple(
+                Channel(names.get(code % (1 << AXIS_AT), "faults"), code >> AXIS_AT)
+                for code in codes[: self.field("scope.last") + 1]
+            ),
             self.field("scope_samples.length"),
             max(1, self.field("scope_samples.every")),
             self.field("scope_place.earlier"),
@@ -249,7 +281,7 @@ class TickScope:
         """The size of the recorder's memory in words; 0: there is no recorder."""
         return self.field("build.scope") * int(NODE_FIELDS["build.scope"].lsb)
 
-    def longest(self, signals: Sequence[str]) -> int:
+    def longest(self, signals: Sequence[object]) -> int:
         """The most samples of these signals that one recording can have; raises NotRecorded."""
         words = self.words()
         if words == 0:
@@ -266,10 +298,10 @@ class TickScope:
         every: units.Value | None = None,
         trigger: Trigger = NOW,
     ) -> None:
-        """Begins a recording of these SIGNALS at a trigger; raises OutOfRange or NotRecorded.
+        """Begins a recording of these signals at a trigger; raises OutOfRange or NotRecorded.
 
-        `samples` is None for as many as fit. `every` (s, or a text) is rounded to servo ticks, and
-        None is each tick.
+        The trigger looks at a signal of the axis of this scope. `samples` is None for as many
+        as fit. `every` (s, or a text) is rounded to servo ticks, and None is each tick.
         """
         chosen, ticks = self.chosen(signals), self.ticks(every)
         most = self.longest(chosen)
@@ -285,15 +317,30 @@ class TickScope:
             )
         self.request(chosen, ticks, count, trigger)
 
-    def chosen(self, signals: Sequence[str]) -> tuple[str, ...]:
-        """These signals in the order of their words; raises OutOfRange."""
-        if unknown := [name for name in signals if name not in SIGNALS]:
+    def chosen(self, signals: Sequence[str]) -> tuple[Channel, ...]:
+        """These signals as channels, each one once; raises OutOfRange, or Refused for an axis that
+        the node does not have.
+        """
+        found = tuple(dict.fromkeys(self.channel(name) for name in signals))
+        if not 1 <= len(found) <= CHANNELS:
             raise OutOfRange(
-                f"there is no signal '{unknown[0]}' to record: there are {', '.join(SIGNALS)}"
+                f"a recording has 1 to {CHANNELS} signals, not {len(found)}: "
+                f"there are {', '.join(SIGNALS)}"
             )
-        if not signals:
-            raise OutOfRange(f"name a signal to record: {', '.join(SIGNALS)}")
-        return tuple(name for name in SIGNALS if name in signals)
+        return found
+
+    def channel(self, name: str) -> Channel:
+        """The channel of a signal, as "error" or "1.error"; raises OutOfRange or Refused."""
+        axis, dot, signal = name.rpartition(".")
+        if signal not in SIGNALS:
+            raise OutOfRange(
+                f"there is no signal '{signal}' to record: there are {', '.join(SIGNALS)}"
+            )
+        if not dot:
+            return Channel(signal, self.axis.number)
+        if not axis.isdecimal():
+            raise OutOfRange(f"'{axis}' of '{name}' is no number of an axis: write 1.{signal}")
+        return Channel(signal, self.node.axis(int(axis)).number)
 
     def ticks(self, every: units.Value | None) -> int:
         """Servo ticks from sample to sample; raises OutOfRange."""
@@ -305,13 +352,17 @@ class TickScope:
             )
         return ticks
 
-    def request(self, chosen: Sequence[str], ticks: int, samples: int, trigger: Trigger) -> None:
+    def request(
+        self, chosen: Sequence[Channel], ticks: int, samples: int, trigger: Trigger
+    ) -> None:
         """Sends the request to record."""
         level = trigger.counts(self.axis.period_nm, self.tick_hz)
         self.axis.request(
             "record_ticks",
-            signals=sum(1 << SIGNALS[name] for name in chosen),
-            trigger=SIGNALS[trigger.signal] | TRIGGERS[trigger.kind] << TRIGGER_AT,
+            last=len(chosen) - 1,
+            **{f"channel_{n}": chosen[n].code if n < len(chosen) else 0 for n in range(CHANNELS)},
+            trigger=SIGNALS[trigger.signal],
+            mode=TRIGGERS[trigger.kind],
             every=ticks,
             samples=samples,
             earlier=trigger.earlier,
@@ -344,8 +395,8 @@ class TickScope:
         setting = self.setting()
         if setting.axis != self.axis.number:
             raise NotRecorded(
-                f"the recording of node {self.node.address} is of axis {setting.axis}, not of axis "
-                f"{self.axis.number}"
+                f"the recording of node {self.node.address} was begun for axis {setting.axis}, "
+                f"not for axis {self.axis.number}"
             )
         ticks = setting.samples * setting.every + setting.delay
         begun, lasts_s = self.now_s(), ticks / self.tick_hz
@@ -395,21 +446,29 @@ class TickScope:
 
     def record_of(self, setting: Setting, words: Sequence[int], first: int) -> TickRecord:
         """The signals of whole samples of words."""
-        rows = numpy.array(words, numpy.int64).reshape(-1, len(setting.signals)).T
+        rows = numpy.array(words, numpy.int64).reshape(-1, len(setting.channels)).T
         values: dict[str, Array] = {}
-        for name, row in zip(setting.signals, rows, strict=True):
+        periods: dict[str, float] = {}
+        for (name, axis), whole, row in zip(setting.channels, setting.signals, rows, strict=True):
+            before = whole.removesuffix(name)
+            periods[before.rstrip(".")] = float(self.node.axis(axis).period_nm)
             if name == "sine_cosine":
-                values["sine"], values["cosine"] = signed(row & 0xFFFF, 16), signed(row >> 16, 16)
+                values[f"{before}sine"] = signed(row & 0xFFFF, 16)
+                values[f"{before}cosine"] = signed(row >> 16, 16)
             elif name in ("target", "position"):
-                near = self.node.request("position", axis=self.axis.number)["position"]
-                values[name] = unwrapped(row, near)
+                near = self.node.request("position", axis=axis)["position"]
+                values[whole] = unwrapped(row, near)
             elif name in ("phase", "faults"):
-                values[name] = numpy.asarray(row, float)
+                values[whole] = numpy.asarray(row, float)
             else:
-                values[name] = signed(row, 16 if name == "command" else 32)
-        if "target" in values and "error" in values and "position" not in values:
-            values["position"] = values["target"] - values["error"]
-        return TickRecord(setting.every, self.tick_s, float(self.axis.period_nm), values, first)
+                values[whole] = signed(row, 16 if name == "command" else 32)
+        for axis in periods:
+            target, error, position = (
+                f"{axis}.{name}" if axis else name for name in ("target", "error", "position")
+            )
+            if target in values and error in values and position not in values:
+                values[position] = values[target] - values[error]
+        return TickRecord(setting.every, self.tick_s, periods, values, first)
 
     def stream(
         self,

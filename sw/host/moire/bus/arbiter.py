@@ -30,6 +30,7 @@ MOTIONS = frozenset(
         *("turn_to", "arm_scope", "step_fine", "excite"),
     }
 )
+RECORDS = ("arm_scope", "record_ticks")  # the requests that arm the two recorders of a node
 POLLS = frozenset({"identify", "status", "position", "encoder", "signal"})  # may be merged
 TABLE_AXIS = 0  # the axis of turn_to
 OTHER_CLIENT = next(code for code, (name, _) in CAUSES.items() if name == "other_client")
@@ -62,7 +63,8 @@ class Arbiter:
         self.moved_by: dict[Place, Hashable] = {}  # the client that began the last motion
         self.switched_on_by: dict[Place, Hashable] = {}
         self.claimed_until: dict[Place, float] = {}  # time of the bus
-        self.scope_of: dict[int, Hashable] = {}  # by node: the client that armed its scope last
+        # by node and one of RECORDS: the client that armed this recorder last
+        self.recorder_of: dict[tuple[int, str], Hashable] = {}
         # the last request of a client to a node, with its reply
         self.last: dict[tuple[Hashable, int], tuple[bytes, bytes]] = {}
         self.farewells: list[Farewell] = []
@@ -111,8 +113,8 @@ class Arbiter:
 
     def note(self, client: Hashable, place: Place, operation: str, body: bytes) -> None:
         """The node has accepted this request for the axis."""
-        if operation == "arm_scope":
-            self.scope_of[place[0]] = client
+        if operation in RECORDS:
+            self.recorder_of[place[0], operation] = client
         if is_motion(operation, body):
             self.moved_by[place] = client
             self.claimed_until.pop(place, None)
@@ -135,7 +137,7 @@ class Arbiter:
         """A client has left: its axes have to be stopped and switched off."""
         self.last = {key: value for key, value in self.last.items() if key[0] != client}
         self.pairs.forget(client)
-        self.scope_of = {node: one for node, one in self.scope_of.items() if one != client}
+        self.recorder_of = {key: one for key, one in self.recorder_of.items() if one != client}
         owned = {*self.moved_by.items(), *self.switched_on_by.items()}
         for place in sorted({place for place, owner in owned if owner == client}):
             self.farewells.append(Farewell(client, place, self.now()))

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xFF461A1E
+PROTOCOL_CRC = 0x6244CA52
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -243,7 +243,7 @@ SCOPE_STATES = {
     3: ("full", "complete"),
 }
 
-# bit: (name, words)
+# code: (name, words)
 TICK_SIGNALS = {
     0: ("sine_cosine", "samples of sine, lower half, and cosine, upper half"),
     1: ("target", "target, low word, 2^-16 period"),
@@ -251,10 +251,11 @@ TICK_SIGNALS = {
     3: ("velocity", "measured velocity, 2^-16 period per tick"),
     4: ("error", "target - position, 2^-16 period"),
     5: ("command", "command to the drive, full scale 2^15"),
-    6: ("position", "position, low word, 2^-16 period"),
-    7: ("phase", "interpolated phase, 2^-16 period"),
-    8: ("fine_command", "command to the fine stage, full scale 2^15"),
-    9: ("faults", "latched faults, bits of a fault"),
+    6: ("integral", "integral of the position loop, full scale 2^31"),
+    7: ("position", "position, low word, 2^-16 period"),
+    8: ("phase", "interpolated phase, 2^-16 period"),
+    9: ("fine_command", "command to the fine stage, full scale 2^15"),
+    10: ("faults", "latched faults, bits of a fault"),
 }
 
 # code: (name, words)
@@ -508,19 +509,24 @@ OPERATIONS = {operation.name: operation for operation in (
                ("time_3", "u16"), ("position_4", "i32"), ("error_4", "i32"),
                ("command_4", "i16"), ("time_4", "u16"),)),
     Operation("record_ticks", 28,
-              "record signals of an axis (bits of a tick_signal) at each servo tick, or one tick "
-              "in so many. The trigger is a tick_signal (bits 0 to 3) and a tick_trigger (bits 4 "
-              "to 6); so many samples are from before it, or the first one comes so many ticks "
-              "after it, with the first value of an excitation. With 0 samples the recording has "
-              "no end and is read while it goes on. What does not fit into the memory ends it",
-              (("axis", "u8"), ("signals", "u16"), ("trigger", "u8"),
+              "record signals of one axis or several at each servo tick, or one tick in so many. "
+              "A channel is a tick_signal (bits 0 to 3) of an axis (bits 4 to 6), `last` is the "
+              "number of the last channel, and no two channels are the same. The trigger is a "
+              "tick_signal of `axis` and a tick_trigger, the mode; so many samples are from "
+              "before it, or the first one comes so many ticks after it, with the first value of "
+              "an excitation. With 0 samples the recording has no end and is read while it goes "
+              "on. What does not fit into the memory ends it",
+              (("axis", "u8"), ("last", "u8"), ("trigger", "u8"),
+               ("mode", "u8"), ("channel_0", "u8"), ("channel_1", "u8"),
+               ("channel_2", "u8"), ("channel_3", "u8"), ("channel_4", "u8"),
+               ("channel_5", "u8"), ("channel_6", "u8"), ("channel_7", "u8"),
                ("samples", "u16"), ("every", "u16"), ("earlier", "u16"),
                ("delay", "u16"), ("level", "i32"),),
               ()),
     Operation("read_ticks", 29,
               "progress of that recording (a scope_state), and its next `count` words, in order "
-              "from `first` on: for each sample one word of each signal. There are none before it "
-              "is complete, unless it has no end",
+              "from `first` on: for each sample one word of each channel. There are none before "
+              "it is complete, unless it has no end",
               (),
               (("state", "u8"), ("first", "u16"), ("count", "u8"),
                ("word_0", "u32"), ("word_1", "u32"), ("word_2", "u32"),

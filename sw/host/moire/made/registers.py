@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x3ABCF55D  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xA49B4CEA  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -123,61 +123,6 @@ FIELDS = (
         "this time, or until a word of the bus is received",
     ),
     Field(
-        "node", "scope", "axis",
-        0x30, 0, 3, False, "rw", "",
-        Fraction(1, 1),
-        "number of the axis",
-    ),
-    Field(
-        "node", "scope", "signals",
-        0x30, 8, 10, False, "rw", "",
-        Fraction(1, 1),
-        "bit n: tick_signal n",
-    ),
-    Field(
-        "node", "scope", "trigger",
-        0x30, 24, 4, False, "rw", "",
-        Fraction(1, 1),
-        "tick_signal that triggers",
-    ),
-    Field(
-        "node", "scope", "mode",
-        0x30, 28, 3, False, "rw", "",
-        Fraction(1, 1),
-        "tick_trigger",
-    ),
-    Field(
-        "node", "scope_samples", "length",
-        0x34, 0, 16, False, "rw", "",
-        Fraction(1, 1),
-        "samples; 0: no end, and they are read while it goes on",
-    ),
-    Field(
-        "node", "scope_samples", "every",
-        0x34, 16, 16, False, "rw", "tick",
-        Fraction(1, 1),
-        "from sample to sample; 0 acts as 1",
-    ),
-    Field(
-        "node", "scope_place", "earlier",
-        0x38, 0, 16, False, "rw", "",
-        Fraction(1, 1),
-        "samples from before the trigger, less than length",
-    ),
-    Field(
-        "node", "scope_place", "delay",
-        0x38, 16, 16, False, "rw", "tick",
-        Fraction(1, 1),
-        "from the trigger to the first sample, which also waits for the first value of a "
-        "waveform; 0: the sample of the trigger",
-    ),
-    Field(
-        "node", "scope_level", "value",
-        0x3C, 0, 32, True, "rw", "",
-        Fraction(1, 1),
-        "level of the trigger; writing begins a recording",
-    ),
-    Field(
         "node", "set_point_tick", "value",
         0x40, 0, 32, False, "rw", "tick",
         Fraction(1, 1),
@@ -280,6 +225,74 @@ FIELDS = (
         0x6C, 0, 32, False, "r", "",
         Fraction(1, 1),
         "word of the recording; reading advances to the next one",
+    ),
+    Field(
+        "node", "scope", "axis",
+        0x70, 0, 3, False, "rw", "",
+        Fraction(1, 1),
+        "number of the axis of the trigger",
+    ),
+    Field(
+        "node", "scope", "last",
+        0x70, 8, 3, False, "rw", "",
+        Fraction(1, 1),
+        "number of the last channel",
+    ),
+    Field(
+        "node", "scope", "trigger",
+        0x70, 16, 4, False, "rw", "",
+        Fraction(1, 1),
+        "tick_signal that triggers",
+    ),
+    Field(
+        "node", "scope", "mode",
+        0x70, 24, 3, False, "rw", "",
+        Fraction(1, 1),
+        "tick_trigger",
+    ),
+    Field(
+        "node", "scope_channels_0", "value",
+        0x74, 0, 32, False, "rw", "",
+        Fraction(1, 1),
+        "channels 0 to 3, a byte each: tick_signal in bits 3:0, number of its axis in bits "
+        "6:4",
+    ),
+    Field(
+        "node", "scope_channels_4", "value",
+        0x78, 0, 32, False, "rw", "",
+        Fraction(1, 1),
+        "channels 4 to 7 in the same way",
+    ),
+    Field(
+        "node", "scope_samples", "length",
+        0x7C, 0, 16, False, "rw", "",
+        Fraction(1, 1),
+        "samples; 0: no end, and they are read while it goes on",
+    ),
+    Field(
+        "node", "scope_samples", "every",
+        0x7C, 16, 16, False, "rw", "tick",
+        Fraction(1, 1),
+        "from sample to sample; 0 acts as 1",
+    ),
+    Field(
+        "node", "scope_place", "earlier",
+        0x80, 0, 16, False, "rw", "",
+        Fraction(1, 1),
+        "samples from before the trigger, less than length",
+    ),
+    Field(
+        "node", "scope_place", "delay",
+        0x80, 16, 16, False, "rw", "tick",
+        Fraction(1, 1),
+        "from the trigger to the first sample, which also waits for the first value of a "
+        "waveform; 0: the sample of the trigger",
+    ),
+    Field(
+        "node", "scope_level", "value",
+        0x84, 0, 32, True, "rw", "",
+        Fraction(1, 1),
+        "level of the trigger; writing begins a recording",
     ),
     Field(
         "bus", "bit_time", "value",

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from moire import units
 from moire.analysis.scope import SAMPLES, TRIGGERS
+from moire.analysis.tick_scope import TRIGGERS as TICK_KINDS
 from moire.bus.arbiter import Place
 from moire.bus.protocol import ADDRESSES
 from moire.client import remedies
@@ -445,21 +446,43 @@ async def home(call: Call) -> Values:
 
 
 async def arm_scope(call: Call) -> Values:
-    await recording.arm(call.bridge, call.client, call.place, call.given)
-    return recording.progress_values(call.bridge, call.place)
+    await recording.arm(call.bridge, call.client, call.place, call.given, recording.SCOPE)
+    return await scope(call)
 
 
 async def scope(call: Call) -> Values:
-    return recording.progress_values(call.bridge, call.place)
+    return recording.progress_values(call.bridge, call.place, recording.SCOPE)
 
 
 async def give_up_scope(call: Call) -> Values:
-    recording.give_up(call.bridge, call.client, call.place)
-    return recording.progress_values(call.bridge, call.place)
+    recording.give_up(call.bridge, call.client, call.place, recording.SCOPE)
+    return await scope(call)
 
 
 async def scope_record(call: Call) -> Values:
     return recording.record_values(call.bridge, call.place)
+
+
+async def record_ticks(call: Call) -> Values:
+    await recording.arm(call.bridge, call.client, call.place, call.given, recording.TICKS)
+    return await ticks(call)
+
+
+async def ticks(call: Call) -> Values:
+    return recording.progress_values(call.bridge, call.place, recording.TICKS)
+
+
+async def give_up_ticks(call: Call) -> Values:
+    recording.give_up(call.bridge, call.client, call.place, recording.TICKS)
+    return await ticks(call)
+
+
+async def ticks_record(call: Call) -> Values:
+    return recording.tick_values(call.bridge, call.place, max(0, call.given.get("first", 0)))
+
+
+async def tick_recorder(call: Call) -> Values:
+    return await recording.recorder_values(call.bridge, call.place)
 
 
 async def signal(call: Call) -> Values:
@@ -601,7 +624,7 @@ SCOPE = {
     "words": ("text", "the state in words, and why a record has ended"),
     "axis": ("text or null", "the axis whose record it is, as node.axis"),
     "trigger": ("text or null", "its trigger"),
-    "owner": ("text or null", "the client to which the scope of the node belongs until then"),
+    "owner": ("text or null", "the client to which the recorder belongs until then"),
     "done": ("whole number", "samples that the server has read"),
     "samples": ("whole number", "samples that it will read"),
 }
@@ -805,6 +828,77 @@ OPERATIONS = (
             "frequency_hz": ("list of numbers", "frequencies of the spectra"),
             "spectrum": ("map of lists", "amplitudes (peak) by the names of the signals above"),
             "csv": ("text", "the record as CSV"),
+        },
+    ),
+    Operation(
+        "POST",
+        f"{AXIS}/ticks",
+        "Record signals of this axis, and of others of its node, at each servo tick with the "
+        "recorder of ticks; with a duration it is a stream without a gap, which begins at once. It "
+        "then belongs to the client until the record is complete. GET says how far it is.",
+        record_ticks,
+        SCOPE,
+        given=(
+            Given(
+                "signals",
+                "text",
+                f"signals with commas between, as 1.error of axis 1; {recording.TICK_DEFAULT} if "
+                "not given",
+                "error,command",
+            ),
+            Given("samples", "whole number", "samples; as many as fit if not given", 1000),
+            Given("every", "time", "time from sample to sample; a servo tick if not given", "1ms"),
+            Given("trigger", "text", f"{', '.join(TICK_KINDS)}; now if not given", "rises"),
+            Given("of", "text", "signal of the trigger; error if not given", "error"),
+            Given("level", "text", "level of the trigger with the unit of its signal", "1 um"),
+            Given("before", "whole number", "samples before the trigger; 0 if not given", 20),
+            Given("delay", "time", "time from the trigger to the first sample", "5ms"),
+            Given("duration", "time", "duration of a stream", "10s"),
+            Given("take", "flag", "whether to take it over from another client", True),
+        ),
+    ),
+    Operation("GET", f"{AXIS}/ticks", "How far the record of ticks of the node is.", ticks, SCOPE),
+    Operation(
+        "DELETE",
+        f"{AXIS}/ticks",
+        "Wait no more for the record of ticks of this client: the recorder is free then. A stream "
+        "ends with what there is of it.",
+        give_up_ticks,
+        SCOPE,
+    ),
+    Operation(
+        "GET",
+        f"{AXIS}/ticks/record",
+        "The last complete record of ticks of an axis, its amplitude spectra, and the file that "
+        "'moire scope save' writes; of a stream that goes on, what there is of it.",
+        ticks_record,
+        {
+            "number": NUMBER,
+            "trigger": ("text", "its trigger"),
+            "before": ("whole number", "samples before the trigger"),
+            "first": ("whole number", "number of the first sample in this answer"),
+            "time_s": ("list of numbers", "times of the samples; 0 is the trigger"),
+            "columns": ("map of lists", "values of the signals; the names end in their units"),
+            "window": ("text", "window of the spectra"),
+            "frequency_hz": ("list of numbers", "frequencies of the spectra of a complete record"),
+            "spectrum": ("map of lists", "amplitudes (peak) by the names of the columns"),
+            "csv": ("text", "the complete record as CSV"),
+        },
+        given=(Given("first", "whole number", "number of the first sample; 0 if not given", 100),),
+    ),
+    Operation(
+        "GET",
+        f"{AXIS}/ticks/recorder",
+        "What the recorder of ticks of the node of an axis can record.",
+        tick_recorder,
+        {
+            "words": ("whole number", "its memory: samples times signals; 0 if there is none"),
+            "tick_s": ("number", "time from servo tick to servo tick"),
+            "axes": ("whole number", "axes of the node"),
+            "channels": ("whole number", "signals that a record has at most"),
+            "signals": ("map of texts", "names of the signals, and what they are"),
+            "triggers": ("map of texts", "names of the triggers, and what they are"),
+            "stream_words": ("whole number", "words of a stream at most: samples times signals"),
         },
     ),
     Operation(

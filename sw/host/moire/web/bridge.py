@@ -47,7 +47,8 @@ LOOK_S = 0.002  # of the clock, between two looks at the time of the bus
 # waiting; and one that has never answered
 ABSENT_S, NEVER_S = 1.0, 10.0
 NO_NAMES = Description()
-THREADS = {"short": 8, "long": 2}  # for commands, and for what takes a hundred exchanges
+# for commands, for what takes a hundred exchanges, and for streams, of which a node has one
+THREADS = {"short": 8, "long": 2, "stream": 8}
 
 Result = TypeVar("Result")
 
@@ -92,7 +93,8 @@ class Bridge:
         self.absent: dict[int, float] = {}  # by address: until when, of the clock
         self.seen: set[int] = set()  # addresses that have ever answered
         self.jogs: dict[tuple[Client, Place], Jog] = {}
-        self.recordings: dict[int, Recording] = {}  # by address, the last one of each scope
+        # the last one of each recorder, by address and the request that arms it
+        self.recordings: dict[tuple[int, str], Recording] = {}
         self.calibrations: dict[Place, Run] = {}  # the last one of each axis
         self.pools = {
             name: ThreadPoolExecutor(count, f"moire-{name}") for name, count in THREADS.items()

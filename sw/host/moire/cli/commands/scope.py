@@ -16,7 +16,8 @@ from moire.cli.files import write_bytes
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import DURATION, FILE, LENGTH, POSITIVE, TEXT, TIME, WHOLE, Name
-from moire.made.bus_tables import SCOPE_STATES, TICK_SIGNALS, TICK_TRIGGERS
+from moire.errors import OutOfRange
+from moire.made.bus_tables import OPERATIONS, SCOPE_STATES, TICK_SIGNALS, TICK_TRIGGERS
 
 if TYPE_CHECKING:
     from moire.analysis.tick_scope import TickRecord
@@ -30,8 +31,8 @@ group = Group(
     "scope",
     help="Record signals of an axis. `arm` and `read` are for every node: 128 samples of position, "
     "error and command around a trigger. `record`, `save` and `stream` need SCOPE_WORDS of "
-    "rtl/node.sv: they record chosen signals at each servo tick, evenly, thousands of samples or "
-    "without end.",
+    "rtl/node.sv: they record up to 8 chosen signals, also of several axes of a node, at each "
+    "servo tick, evenly, thousands of samples or without end.",
     example=EXAMPLE,
 )
 moire.add_command(group)
@@ -125,13 +126,15 @@ def show(call: Call) -> None:
 
 SIGNALS = [name for name, _ in TICK_SIGNALS.values()]
 KINDS = [name for name, _ in TICK_TRIGGERS.values()]
+CHANNELS = sum(name.startswith("channel_") for name, _ in OPERATIONS["record_ticks"].request)
 SIGNAL = Name("signal", SIGNALS)
 WHAT = click.option(
     "--signals",
     default="target,error,command",
     metavar=",".join(SIGNALS),
-    help="What is recorded, with commas between. target and error together also give the position. "
-    "The default is target,error,command.",
+    help=f"What is recorded, with commas between, {CHANNELS} signals at most. A signal of another "
+    "axis of the node has its name or number before it, as in y.error or 1.error. target and error "
+    "together also give the position. The default is target,error,command.",
 )
 EVERY = click.option(
     "--every",
@@ -146,9 +149,25 @@ COLUMNS = (
 )
 
 
-def names(signals: str) -> list[str]:
-    """The names in a text with commas between."""
-    return [name.strip() for name in signals.split(",") if name.strip()]
+def names(call: Call, signals: str) -> list[str]:
+    """The signals in a text with commas between, with numbers for the names of axes; raises
+    UnknownName, or OutOfRange for an axis of another node.
+    """
+    return [numbered(call, name.strip()) for name in signals.split(",") if name.strip()]
+
+
+def numbered(call: Call, name: str) -> str:
+    """A signal with the number of its axis before it, where it has the name of an axis."""
+    axis, dot, signal = name.rpartition(".")
+    if not dot or axis.isdecimal():
+        return name
+    node, number = call.session.description.axis(axis).place
+    if node != call.options.address:
+        raise OutOfRange(
+            f"axis {axis} is of node {node}: the signals of a recording are of one node, here of "
+            f"node {call.options.address}"
+        )
+    return f"{number}.{signal}"
 
 
 def write(call: Call, file: str, made: TickRecord, picture: str | None, more: str = "") -> None:
@@ -164,7 +183,12 @@ def write(call: Call, file: str, made: TickRecord, picture: str | None, more: st
 
 @group.command(
     "record",
-    help="Record signals of an axis at each servo tick, or at one in some, from now on or from a "
+    check=lambda given: (
+        "--before and --delay do not go together: the first sample is before the trigger or after"
+        if given["before"] and given["delay"] is not None
+        else None
+    ),
+    help="Record signals at each servo tick, or at one in some, from now on or from a "
     "trigger on; return at once.",
     example="moire --port twin home -- scope record --trigger beyond --of target_velocity "
     "--level 4mm/s --before 100 -- move 100um -- scope save move.csv",
@@ -207,6 +231,12 @@ def write(call: Call, file: str, made: TickRecord, picture: str | None, more: st
     help="The number of samples from before the trigger, which counts once there are so many. The "
     "default is 0.",
 )
+@click.option(
+    "--delay",
+    type=DURATION,
+    metavar="TIME",
+    help="The time from the trigger to the first sample, instead of --before.",
+)
 def record(
     call: Call,
     signals: str,
@@ -216,19 +246,22 @@ def record(
     of: str,
     level: str | None,
     before: int,
+    delay: Fraction | None,
 ) -> None:
     """The recording goes on in the node."""
     from moire.analysis.tick_scope import TickScope, Trigger  # NumPy only where it is needed
 
     scope = TickScope(call.axis)
-    scope.start(names(signals), samples, every, Trigger(trigger, of, level, before))
+    late = round((delay or 0) * call.node.identity.tick_hz)
+    scope.start(names(call, signals), samples, every, Trigger(trigger, of, level, before, late))
     setting = scope.setting()
     seconds = Fraction(setting.samples * setting.every, call.node.identity.tick_hz)
     call.say_of_axis(
         {"signals": setting.signals, "samples": setting.samples, "every_ticks": setting.every},
         f"{call.where}: {setting.samples} samples of {', '.join(setting.signals)} in "
         f"{units.format_time(seconds)}"
-        + ("" if trigger == "now" else f", {before} of them before the trigger"),
+        + ("" if trigger == "now" else f", {before} of them before the trigger")
+        + ("" if delay is None else f", {units.format_time(delay)} after the trigger"),
     )
 
 
@@ -279,6 +312,7 @@ def stream(
     """The drive stays as it is."""
     from moire.analysis.tick_scope import TickScope, joined
 
-    made = joined(list(TickScope(call.axis).stream(names(signals), every, duration)))
-    rate = len(names(signals)) / (made.every * made.tick_s)
+    scope, chosen = TickScope(call.axis), names(call, signals)
+    made = joined(list(scope.stream(chosen, every, duration)))
+    rate = len(scope.chosen(chosen)) / (made.every * made.tick_s)
     write(call, file, made, picture, f", {rate:.4g} words/s without a gap")

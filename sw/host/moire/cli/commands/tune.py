@@ -98,6 +98,14 @@ def contradiction(given: Mapping[str, Any]) -> str | None:
     help="Number of records of the frequency response, which are averaged. The default is 2.",
 )
 @click.option(
+    "--lowest",
+    type=FREQUENCY,
+    default="1Hz",
+    metavar="FREQUENCY",
+    help="The lowest frequency of the frequency response. The default is 1Hz; what is below 20 Hz "
+    "takes four fifths of the time.",
+)
+@click.option(
     "--points",
     type=FILE,
     metavar="CSV",
@@ -168,6 +176,7 @@ def tune(
     peak: Fraction,
     speed: Fraction | None,
     records: int,
+    lowest: Fraction,
     points: str | None,
     amplitude: Fraction,
     reach: Fraction,
@@ -198,7 +207,7 @@ def tune(
         plant = tuner.identify(tuner.Record(*read_record(file), tick_s))
     elif method == RESPONSE or (method is None and TickScope(call.axis).words()):
         nm_s = None if speed is None else speed * 1_000_000
-        response = frequency_response.measure(call.switch_on(), peak, nm_s, records)
+        response = frequency_response.measure(call.switch_on(), peak, nm_s, records, float(lowest))
         if points:
             write_text(points, response.csv())
         plant = frequency_response.fit(response)
