@@ -15,12 +15,17 @@ position afterwards, and the error messages so far.
     override F         feed override, 1 is 100 %
     pause, resume      feed hold
     stopped            waits until the machine is off or the emergency stop is on
+    set NAME VALUE     sets a pin of HAL that nothing else sets
+    pin NAME VALUE     waits until a pin of HAL has a value
+    pins NAME …        reads pins of HAL, into the report
 """
 
 import json
 import sys
 import time
 from pathlib import Path
+
+import hal
 
 import linuxcnc
 
@@ -35,6 +40,9 @@ class Operator:
     def __init__(self):
         self.command, self.status = linuxcnc.command(), linuxcnc.stat()
         self.errors, self.messages = linuxcnc.error_channel(), []
+        self.component = hal.component("operator")  # without one, no pin can be read
+        self.component.ready()
+        self.values = {}  # of pins that were read
         self.patience_s = PATIENCE_S
 
     def patience(self, seconds):
@@ -128,12 +136,24 @@ class Operator:
     def stopped(self):
         return self.wait(lambda: not self.is_on())
 
+    def set(self, name, value):
+        hal.set_p(name, str(value))
+        return True
+
+    def pin(self, name, value):
+        return self.wait(lambda: hal.get_value(name) == value)
+
+    def pins(self, *names):
+        self.values = {name: hal.get_value(name) for name in names}
+        return True
+
     def obey(self, step):
         """One step, as a row of the report."""
         done = getattr(self, step[0])(*step[1:])
         self.look()
         joints = [self.status.joint_actual_position[n] for n in range(self.status.joints)]
-        return {"step": step, "done": bool(done), "joints": joints, "messages": self.messages[:]}
+        row = {"step": step, "done": bool(done), "joints": joints, "messages": self.messages[:]}
+        return {**row, "pins": self.values}
 
 
 def main():

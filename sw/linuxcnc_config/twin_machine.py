@@ -82,7 +82,7 @@ STAGE = Plant(
         period_ns=round(SERVO_MS * 1e6),
         axes=[Joint(name, 0.8, -0.5, 100, 4, 50, 0, 0, 0) for name in "XY"],
     ),
-    Axis("stage"),
+    Axis("stage", {"travel_start_lowest": -0.8e-3, "travel_start_highest": -0.6e-3}),
     "stream",
     {**NODE, "FILTERS": 2},
     STAGE_SERVO,
@@ -123,10 +123,10 @@ class TwinMachine:
         self.thread = threading.Thread(target=self.gateway.serve, daemon=True)
 
     def configuration(self) -> Configuration:
-        """That of LinuxCNC for this twin."""
+        """That of LinuxCNC for this twin, whose axes home at the same time."""
         behind_ms = DELAY_MS + 2e3 * PERIOD_S
         axes = [
-            replace(axis, following=axis.velocity * behind_ms * 2e-3)
+            replace(axis, following=axis.velocity * behind_ms * 2e-3, sequence=0)
             for axis in self.plant.configuration.axes
         ]
         return replace(
@@ -176,7 +176,7 @@ class TwinMachine:
         axis. After the end of LinuxCNC, which may have seen the end for some periods only: it rests
         on without packets.
         """
-        for _ in range(REST // PARTS):
+        for _ in range(2 * REST // PARTS):
             self.exchange(b"", PERIOD_S)
         found: Points = numpy.zeros((len(self.path), 3))
         found[:, : self.axes] = self.path

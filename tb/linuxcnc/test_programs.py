@@ -60,6 +60,20 @@ G76 P{PITCH_MM} Z3 I-1 J0.2 K0.6 R1 Q0 H0 E0 L0
 M5
 M2
 """
+LATCHES = [f"moire.0.axis.{n}.position-latch" for n in range(3)]
+COUNTS = [f"moire.0.encoder.3.{name}" for name in ("count", "rawcounts")]
+PINS = {  # steps after a program
+    "surface": [
+        ["pins", *LATCHES],
+        ["pin", "moire.0.digin.0.in", False],
+        ["pin", "moire.0.digin.0.in-not", True],
+    ],
+    "lathe": [
+        ["pins", *COUNTS],
+        ["set", "moire.0.encoder.3.reset", 1],
+        ["pin", "moire.0.encoder.3.count", 0],
+    ],
+}
 HELD = circle((12, 16), 2, 1, 600)
 STOPPED = {  # what interrupts a circle
     "estop": circle((6, 10), 1, 1, 600),
@@ -152,6 +166,11 @@ class Day(NamedTuple):
                 return errors
         raise KeyError(name)
 
+    def pins(self, names):
+        """The values of pins, when they were read."""
+        row = next(row for row in self.ran.report if row["step"] == ["pins", *names])
+        return numpy.array([row["pins"][name] for name in names])
+
     def messages(self):
         """All error messages that LinuxCNC showed."""
         return self.ran.report[-1]["messages"]
@@ -164,7 +183,7 @@ def day(tmp_path_factory):
     node = IdealNode(3, spindle=IdealAxis(turn=PERIODS_PER_TURN, spin=spin), above=above)
     steps = [["on"], ["home"]]
     for name in [*PROGRAMS, "lathe"]:
-        steps += [["start", f"{name}.ngc"], ["finish"]]
+        steps += [["start", f"{name}.ngc"], ["finish"], *PINS.get(name, [])]
     steps += [["start", "held.ngc"], ["line", FIRST_LINE], ["override", 0.5]]
     steps += [["pause"], ["resume"], ["override", 1.2], ["finish"], ["override", 1.0]]
     for name in STOPPED:
@@ -198,6 +217,7 @@ def test_the_points_that_g38_touches_are_on_the_surface(day):
     places = [move.end[:2] for move in PROGRAMS["surface"].moves[1::3]]
     assert len(points) == len(places) and abs(points[:, :2] - places).max() < MOST_ERROR_MM
     assert max(abs(SURFACE.above(point)) for point in points) < 3 * LSB_MM
+    assert math.dist(day.pins(LATCHES), points[-1]) < LSB_MM, "the last touch"
 
 
 def thread_passes(day):
@@ -222,6 +242,8 @@ def test_g33_and_each_pass_of_g76_follow_the_spindle_in_the_same_groove(day):
     apart = (starts - starts[0] + 0.5) % 1 - 0.5
     print(f"a pass follows the spindle within {within:.5f} turns, passes {abs(apart).max():.5f}")
     assert within < 1e-3 and abs(apart).max() < 1e-3
+    count, rawcounts = day.pins(COUNTS)
+    assert count > 0 and (rawcounts - count) % (4 * PERIODS_PER_TURN) == 0, "0 at an index"
 
 
 def test_feed_override_hold_and_lost_packets_stay_on_the_circle(day):

@@ -537,7 +537,7 @@ def test_a_node_with_set_points_and_the_real_time_link_has_their_size():
     plain, stream = (
         size.estimate("ecp5", machine.named(name)) for name in ("mill", "mill_linuxcnc")
     )
-    more = size.LINK + 3 * size.FEATURES["backlash"]
+    more = size.LINK + 3 * (size.FEATURES["backlash"] + size.FEATURES["capture"])
     assert stream.lut - plain.lut - more == 13_996 - 9464 + 1
     assert stream.block_ram == plain.block_ram
 

@@ -59,6 +59,7 @@ def test_each_signal_of_an_axis_is_recorded_as_its_registers_show_it(node, axis)
     node.write("axis.kp", 1000, axis=axis)
     node.write("axis.ki", 1 << 16, axis=axis)
     node.write("axis.integral_limit", 0x7FFF, axis=axis)
+    node.count(axis, 3)
     node.write("axis.strobes", set_target_to_position=1, axis=axis)
     node.enable(axis, closed_loop=1)
     node.ticks(2)
@@ -71,7 +72,7 @@ def test_each_signal_of_an_axis_is_recorded_as_its_registers_show_it(node, axis)
     found = words(node, len(channels))
     assert len(found) == 6 and node.read("node.scope_state", "available") == 0
     for position, error, command, _, target in found:
-        assert (position, error, target) == (-4 * COUNT, 4 * COUNT, 0)
+        assert (position, error, target) == (-COUNT, 4 * COUNT, 3 * COUNT)
         assert command >= 1000
     integrals = [sample[3] for sample in found]
     assert integrals == sorted(integrals) and 0 < integrals[0] < integrals[-1]
@@ -185,8 +186,9 @@ def test_what_does_not_fit_into_the_memory_ends_a_recording_without_end(node):
     assert node.read("node.scope_state", "available") == WORDS
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_an_excitation_adds_its_waveform_to_the_commands_of_its_axis(node, axis):
+@pytest.mark.parametrize("axis, delay", [(0, 1), (1, 3)])
+def test_an_excitation_adds_its_waveform_to_the_commands_of_its_axis(node, axis, delay):
+    """The recording begins with its first value, so after a delay of 3 ticks it waits."""
     node.start()
     wave = [1000, -2000, 3000, 0]
     for at, value in enumerate(wave):
@@ -197,8 +199,8 @@ def test_an_excitation_adds_its_waveform_to_the_commands_of_its_axis(node, axis)
     node.ticks(3)
     node.write("node.excitation", node.word("node.excitation", axis=axis, period=4, limit=3000))
     channels = [("command", axis), ("command", other(axis))]
-    begin(node, channels, 9, delay=1)
-    node.ticks(14)
+    begin(node, channels, 9, delay=delay)
+    node.ticks(18)
     found = words(node, 2)
     assert [sample[0] for sample in found[:8]] == [1500, -1500, 3000, 500] * 2
     assert {sample[1] for sample in found} == {500}
