@@ -422,9 +422,9 @@ def test_a_stepped_profile_taken_in_short_pieces_is_the_same_motion(longest):
     def ticks_of(longest):
         plan, stepped = Plan(), SteppedProfile(first=1 << 20, top=9 << 20, ticks=80)
         stepped.rise[:], stepped.border[:] = [1 << 20] * 3, [3 << 20, 6 << 20]
-        assert library().planner_stepped_move(
-            ctypes.byref(plan), ctypes.byref(stepped), 1 << 10
-        ), plan.cause
+        assert library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stepped), 1 << 10), (
+            plan.cause
+        )
         pieces = taken(plan, FOREVER, longest)
         assert max(piece[3] for piece in pieces) <= longest
         return [velocity for velocity, _, _, ticks in pieces for _ in range(ticks)]
