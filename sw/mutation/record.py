@@ -12,9 +12,9 @@ from twin.build import ROOT
 RECORD = ROOT / "docs" / "mutants.toml"
 HEAD = """\
 # SPDX-License-Identifier: Apache-2.0
-# Which mutants of which blocks and modules have been run, and what no test sees. Written by
-# `python -m mutation.blocks --record` and `python -m mutation.host --record`; docs/mutation.md says
-# how to read it.
+# Which mutants of which blocks and sources have been run, and what no test sees. Written by
+# `python -m mutation.blocks --record`, and the same with `mutation.host` and `mutation.firmware`;
+# docs/mutation.md says how to read it.
 """
 Entry = Mapping[str, int | Sequence[str]]
 

@@ -140,6 +140,7 @@ def test_a_waveform_is_loaded_up_to_its_longest(machine):
     values = {f"value_{n}": 100 * n - 900 for n in range(VALUES)}
     machine.ask("load_excitation", first=48, **values)
     assert [machine.scope.waveform[48 + n] for n in range(VALUES)] == list(values.values())
+    assert set(machine.scope.waveform) == set(range(48, 48 + VALUES)), "and nothing behind them"
     machine.ask("load_excitation", first=longest - 2, **values)
     assert machine.scope.waveform[longest - 1] == -800 and 0 not in machine.scope.waveform
 
