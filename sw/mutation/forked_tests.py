@@ -35,6 +35,7 @@ from twin.build import ROOT
 from twin.compiled import host_library
 
 NO_END, ENDS = "(no end)", "(the process ends by itself)"
+MEMORY = 4 << 30  # bytes that a run may have
 WAITING = 10  # a run that waits takes no computing time: the clock may show so many times more
 Request = Mapping[str, object]
 LOADED = (hypothesis, np, rich.console)  # for all forks at once
@@ -114,6 +115,7 @@ def forked(mutate: Callable[[], None], tests: Sequence[str], longest_s: float) -
     pid = os.fork()
     if not pid:
         resource.setrlimit(resource.RLIMIT_CPU, (int(longest_s) + 1, int(longest_s) + 2))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         signal.alarm(WAITING * (int(longest_s) + 1))
         mutate()
         os._exit(run(tests, pipe))

@@ -415,3 +415,18 @@ def test_a_stepped_profile_rises_by_sections_and_falls_as_its_mirror(as_printed)
         not library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stepped), 1 << 16)
         and plan.cause == 5
     )
+
+
+@pytest.mark.parametrize("longest", [1, 30, 79, 81])
+def test_a_stepped_profile_taken_in_short_pieces_is_the_same_motion(longest):
+    def ticks_of(longest):
+        plan, stepped = Plan(), SteppedProfile(first=1 << 20, top=9 << 20, ticks=80)
+        stepped.rise[:], stepped.border[:] = [1 << 20] * 3, [3 << 20, 6 << 20]
+        assert library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stepped), 1 << 10), (
+            plan.cause
+        )
+        pieces = taken(plan, FOREVER, longest)
+        assert max(piece[3] for piece in pieces) <= longest
+        return [velocity for velocity, _, _, ticks in pieces for _ in range(ticks)]
+
+    assert ticks_of(longest) == ticks_of(LONGEST)

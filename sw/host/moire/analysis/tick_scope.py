@@ -264,11 +264,10 @@ class TickScope:
         """The setting of the last recording, whoever began it."""
         words = [self.field(f"scope_channels_{first}.value") for first in (0, 4)]
         codes = b"".join(word.to_bytes(4, "little") for word in words)
-        names = {code: name for name, code in SIGNALS.items()}
         return Setting(
             self.field("scope.axis"),
             tuple(
-                Channel(names.get(code % (1 << AXIS_AT), "faults"), code >> AXIS_AT)
+                Channel(code_name(TICK_SIGNALS, code % (1 << AXIS_AT), "signal"), code >> AXIS_AT)
                 for code in codes[: self.field("scope.last") + 1]
             ),
             self.field("scope_samples.length"),

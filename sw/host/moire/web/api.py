@@ -535,17 +535,19 @@ async def of_parameters(call: Call, work: Callable[[Axis], list[ParameterValue]]
 
 
 async def parameter(call: Call) -> Values:
-    return await call.command(
+    values: Values = await call.command(
         lambda axis: parameter_values(call, axis, axis.get_parameter(call.name))
     )
+    return values
 
 
 async def set_parameter(call: Call) -> Values:
-    return await call.command(
+    values: Values = await call.command(
         lambda axis: parameter_values(
             call, axis, axis.set_parameter(call.name, call.given["value"])
         )
     )
+    return values
 
 
 def parameter_values(call: Call, axis: Axis, value: ParameterValue) -> Values:
