@@ -218,7 +218,7 @@ FIGURES = {
         "of 10^4 homings to an index by the driver's index-enable, 1 % of packets lost, in "
         "lockstep with the simulated mill: another count of the same position than without loss",
         "0",
-        Quick({"homings": 3}, "3 homings"),
+        Quick({"homings": 6}, "6 homings"),
         0,
     ),
     "thread_us_max": Figure(

@@ -269,7 +269,7 @@ def moments(path: Sequence[Sequence[float]], periods_per_mm: float) -> Points:
     return found
 
 
-SURFACE = Surface((0.37, 0.053), -8.4)  # below where the axes home
+SURFACE = Surface((0.37, 0.053), -8.4004)  # below where the axes home
 STAGE_PROGRAMS = {  # of S0; the arc begins and ends 30 degrees from a reversal of Y
     "circle": circle((1.5, 1.5), 0.5, 0, 60),
     "arc": Program((1.25, 1.5 + 0.25 * 3**0.5, 0), 60).arc(1.5, 1.5, -math.pi / 3),
