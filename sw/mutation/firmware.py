@@ -10,16 +10,13 @@ sees is a survivor. It is equivalent if the compiler makes the same code of it; 
 better test, or a reason in firmware.toml.
 """
 
-import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 from firmware import build as firmware_build
-from mutation import command
 from mutation.block import BUILD
-from mutation.sources import MUTANTS, Language, SourceMutant, entry_of
+from mutation.sources import Language, SourceMutant
 from twin.build import FIRMWARE
 from twin.compiled import host_library
 
@@ -56,15 +53,5 @@ C = Language(
 )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m mutation.firmware")
-    parser.add_argument(
-        "names", nargs="*", metavar="SOURCE", help="sources of firmware.toml; default: all"
-    )
-    unknown = "has no tests in sw/mutation/firmware.toml"
-    known, measure = C.tests(), C.measured
-    return command.run(parser, arguments, known, unknown, MUTANTS, measure, entry_of)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(C.main())

@@ -9,13 +9,10 @@ no test sees is a survivor. It needs a better test, or a reason in host.toml. No
 mutant is equivalent to the module.
 """
 
-import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
-from mutation import command
-from mutation.sources import MUTANTS, Language, entry_of
+from mutation.sources import Language
 from twin.build import ROOT
 
 
@@ -29,15 +26,5 @@ PYTHON = Language(
 )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m mutation.host")
-    parser.add_argument(
-        "names", nargs="*", metavar="MODULE", help="modules of host.toml; default: all"
-    )
-    unknown = "has no tests in sw/mutation/host.toml"
-    known, measure = PYTHON.tests(), PYTHON.measured
-    return command.run(parser, arguments, known, unknown, MUTANTS, measure, entry_of)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(PYTHON.main())

@@ -5,6 +5,7 @@ A mutant is a text of the source with one fault. A table (TOML) has the tests of
 reasons for mutants that no test can find. mutation.forked_tests runs the tests for each text.
 """
 
+import argparse
 import fnmatch
 import json
 import os
@@ -18,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from mutation import record
+from mutation import command, record
 from mutation.block import BUILD, MutationError
 from twin.build import ROOT
 
@@ -212,6 +213,16 @@ class Language:
             f"{r.source}: {r.line}: {r.mutant}" for r, needed in met.items() if not needed
         ]
         return verdicts
+
+    def main(self, arguments: Sequence[str] | None = None) -> int:
+        """The command line of a mutation test of such sources; returns its exit code."""
+        parser = argparse.ArgumentParser(prog=f"python -m mutation.{self.name}")
+        parser.add_argument(
+            "names", nargs="*", metavar="SOURCE", help=f"of {self.table.name}; default: all"
+        )
+        unknown = f"has no tests in {self.table.relative_to(ROOT)}"
+        known, measure = self.tests(), self.measured
+        return command.run(parser, arguments, known, unknown, MUTANTS, measure, entry_of)
 
 
 def drawn(places: Mapping[Place, list[Fault]], draw: random.Random) -> Iterator[Fault]:

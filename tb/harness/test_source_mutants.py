@@ -167,7 +167,7 @@ def test_every_source_and_test_of_the_table_exists(language):
 
 
 @pytest.mark.parametrize(
-    "main, source, package", [(host.main, MODULE, "cosmic_ray"), (firmware.main, SOURCE, "clang")]
+    "main, source, package", [(PYTHON.main, MODULE, "cosmic_ray"), (C.main, SOURCE, "clang")]
 )
 def test_without_the_package_one_line_says_what_to_do(
     main, source, package, monkeypatch, capsys, tmp_path
@@ -177,7 +177,7 @@ def test_without_the_package_one_line_says_what_to_do(
     assert capsys.readouterr().err == f"{package} is not installed: make mutators\n"
 
 
-@pytest.mark.parametrize("main, table", [(host.main, "host"), (firmware.main, "firmware")])
+@pytest.mark.parametrize("main, table", [(PYTHON.main, "host"), (C.main, "firmware")])
 def test_an_unknown_source_is_refused(main, table, capsys):
     with pytest.raises(SystemExit):
         main(["nothing"])
