@@ -20,6 +20,7 @@ GOWIN    := build/gowin/stamp
 DOCS     := build/docs_tools/stamp
 MUTATORS := build/mutators/stamp
 LOADER_STAMP := build/loader/stamp
+UPLOT    := sw/host/moire/web/uplot/integrity
 
 say = @printf '%s\n' '--- $(1)'
 
@@ -28,10 +29,10 @@ help:             ## this list
 	@sed -nE 's/^([a-z]+): [^#]*## (.*)/  \1\t\2/p; s/^([a-z]+): *## (.*)/  \1\t\2/p' $(MAKEFILE_LIST) | sort -u -k1,1 | expand -t 14
 	@printf '\nThe first target that needs them fetches the tools into build/venv (tools/setup.sh).\n'
 
-demo: $(SETUP) $(FIRMWARE)   ## the S0 stage: home it, move it, show where it went
+demo: $(SETUP) $(FIRMWARE) $(UPLOT)   ## the S0 stage: home it, move it, show where it went
 	@$(PYTHON) -m experiments.s0_stage
 
-test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1, NETLIST=ecp5|ice40, CROSSINGS=seed
+test: $(SETUP) $(FIRMWARE) $(UPLOT)   ## all tests; K=part of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1, NETLIST=ecp5|ice40, CROSSINGS=seed
 	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(NETLIST), on netlists for $(NETLIST))$(if $(SEED), with SEED=$(SEED)))
 	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' NETLIST='$(NETLIST)' POWER_UP='$(POWER_UP)' CROSSINGS='$(CROSSINGS)' $(PYTHON) -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder $(if $K,-k '$K') tb
 
@@ -102,14 +103,14 @@ $(FIRMWARE): $(shell find sw/firmware -type f) | $(SETUP)
 
 FORM = $(if $(QUICK),--quick) $(if $(SEED),--seed $(SEED))
 
-figure: $(SETUP) $(FIRMWARE)   ## NAME=x measures one figure: `x VALUE UNIT`; QUICK=1 in short, SEED=n
+figure: $(SETUP) $(FIRMWARE) $(UPLOT)   ## NAME=x measures one figure: `x VALUE UNIT`; QUICK=1 in short, SEED=n
 	@$(PYTHON) -m figures.figure $(or $(NAME),$(error say which: make figure NAME=x)) $(FORM)
 
-quick: $(SETUP) $(FIRMWARE)    ## every figure in its short form
+quick: $(SETUP) $(FIRMWARE) $(UPLOT)    ## every figure in its short form
 	$(call say,figures in their short forms)
 	@$(PYTHON) -m figures.figure --all --quick
 
-figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page; QUICK=1 in their short forms
+figures: $(SETUP) $(FIRMWARE) $(UPLOT)  ## all figures, and their page; QUICK=1 in their short forms
 	@$(PYTHON) -m figures.figure --all $(FORM)
 
 SOAK = $(if $(LIST),--list) $(if $(SCHEDULER),--scheduler '$(SCHEDULER)') $(if $(RESULTS),--results '$(RESULTS)') \
@@ -160,6 +161,13 @@ $(LITEX): sw/embed/litex.lock tools/scapy.lock | $(SETUP)
 	@$(PYTHON) -m pip --disable-pip-version-check --no-input -q install --no-deps -r tools/scapy.lock
 	@touch $@
 
+page: $(SETUP)    ## uPlot (npm), which draws the plots of the live page, into sw/host/moire/web/uplot; docs/page.md
+	@$(PYTHON) -m tools.page
+
+# what needs no plots goes on without them, and the next run tries again
+$(UPLOT): sw/host/moire/web/package-lock.json | $(SETUP)
+	@$(PYTHON) -m tools.page --try
+
 chromium: $(SETUP) ## Chromium by apt-get, and Playwright, which drives it in the tests of the live page; docs/page.md
 	@command -v chromium > /dev/null || { $(AS_ROOT) apt-get -q update && $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
 		apt-get -qy install --no-install-recommends chromium fonts-dejavu-core; } > build/chromium.log 2>&1 < /dev/null \
@@ -207,4 +215,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board load flash docs litex mutators sigrok gowin loader linuxcnc chromium ngspice spice clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board load flash docs litex mutators sigrok gowin loader linuxcnc chromium page ngspice spice clean

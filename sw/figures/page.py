@@ -4,8 +4,9 @@
 import statistics
 
 from figures import browser
-from figures.common import Figure, Quick, console
+from figures.common import Absent, Figure, Quick, console
 from figures.serve import served
+from moire.web import page as live_page
 
 STARTS = 7
 SHOWN = ".position [data-field=position]:not(:empty)"  # a position
@@ -14,6 +15,8 @@ NOW = "performance.now()"
 
 
 def page_first_paint_ms(starts: int = STARTS) -> float:
+    if not live_page.has_plots():
+        raise Absent("uPlot is not fetched: make page")
     paints, shown = [], []
     with served() as ports:
         for _ in range(starts):

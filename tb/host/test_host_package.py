@@ -95,11 +95,13 @@ def test_every_module_of_the_command_line_is_in_the_wheel(installed):
     assert len(names) > 20
 
 
-def test_the_files_of_the_live_page_are_in_the_wheel(installed):
-    folder = HOST / "moire" / "web" / "static"
+@pytest.mark.parametrize("folder", ["static", "uplot"])
+def test_the_files_of_the_live_page_are_in_the_wheel(installed, folder):
+    names = {one.name for one in (HOST / "moire" / "web").glob(f"{folder}/*")}
     program = (
-        "from importlib.resources import files; "
-        "print(sorted(one.name for one in files('moire.web').joinpath('static').iterdir()))"
+        "from importlib.resources import files; from pathlib import Path; "
+        f"folder = Path(str(files('moire.web'))) / {folder!r}; "
+        "print(sorted(one.name for one in folder.glob('*')))"
     )
     ended = installed("python", "-c", program)
-    assert ended.stdout == f"{sorted(one.name for one in folder.iterdir())}\n", ended.stderr
+    assert ended.stdout == f"{sorted(names)}\n", ended.stderr

@@ -63,6 +63,17 @@ def test_the_page_comes_with_all_it_names_and_may_load_nothing_else(shared):
         assert found.status == 404 and '"no_such_path"' in body
 
 
+def test_uplot_is_served_where_it_is_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(page, "files", lambda package: tmp_path)
+    for name in ("static/index.html", "uplot/uPlot.esm.js", "uplot/LICENSE"):
+        assert not page.has_plots() or name.startswith("uplot")
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(name)
+    found = page.responses()
+    assert page.has_plots() and [*found] == ["/", "/page/uplot/uPlot.esm.js"]
+    assert found["/page/uplot/uPlot.esm.js"].media_type == "text/javascript"
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_names_no_other_site_and_has_no_code_inside_html(name):
     assert not re.search(r"(https?:)?//\w+\.\w", FILES[name])

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live page in Chromium, in front of the compiled firmware. Without Chromium and Playwright
-(`make chromium`) these tests are skipped.
+(`make chromium`) these tests are skipped, and without uPlot (`make page`) those of the plots.
 """
 
 import json
@@ -14,6 +14,7 @@ from moire.client.bus import Bus
 from moire.client.segments import Segments, SegmentTable
 from moire.description import AxisDescription, Description
 from moire.made.bus_tables import FAULTS
+from moire.web import page as live_page
 from moire.web.jog import Jog
 from tb.bench import ROOT
 from tb.fakes.bus_node import BusNode
@@ -30,6 +31,7 @@ PICTURE = ROOT / "build" / "report" / "page.png"  # docs/page.png is a copy
 SCOPE_PICTURE = PICTURE.with_name("page_scope.png")  # the same
 PATIENCE_MS = 30_000
 WIDTHS = (380, 1280, 2560)
+PLOTS = pytest.mark.skipif(not live_page.has_plots(), reason="uPlot is not fetched: make page")
 HOLD_S = 2  # of a jog: a busy computer delays what the page asks for ten times a second
 ESTOP = next(code for code, (name, _) in FAULTS.items() if name == "estop")
 
@@ -408,13 +410,13 @@ def test_a_token_is_asked_for_and_one_that_only_reads_shows_no_controls(browser,
 # ------------------------------------------------------------------ what is drawn
 
 
+@PLOTS
 def test_the_plots_and_the_parameters_show_what_the_axis_does_at_every_width(served, page):
     move(page, "0.5", "Move by")
     see(page, ".message", "reached")
-    page.locator(
-        "canvas[aria-label^='Position in mm over the last 30 s: axis 1.0 from']"
-    ).wait_for()
-    drawn = page.locator("#charts canvas").evaluate_all(
+    position = "#charts .plot[aria-label^='Position in mm over the last 30 s: axis 1.0 from']"
+    page.locator(position).wait_for()
+    drawn = page.locator("#charts .plot canvas").evaluate_all(
         """all => all.map(one => new Set(new Uint32Array(one.getContext("2d").getImageData(
            0, 0, one.width, one.height).data.buffer)).size)"""
     )
@@ -449,17 +451,18 @@ def test_the_plots_and_the_parameters_show_what_the_axis_does_at_every_width(ser
 
 # the samples whose place in a chart has no pixel of its colour within one pixel
 NOT_DRAWN = """async ([name, xs, values]) => {
-    const { MARGIN } = await import("/page/plot.js");
-    const canvas = document.querySelector(`canvas[data-signal="${name}"]`);
-    const { from, to, low, high } = JSON.parse(canvas.dataset.range);
+    const plot = document.querySelector(`.plot[data-signal="${name}"]`);
+    const canvas = plot.querySelector("canvas");
+    const outer = canvas.getBoundingClientRect();
+    const inner = plot.querySelector(".u-over").getBoundingClientRect();
+    const { from, to, low, high } = JSON.parse(plot.dataset.range);
     const context = canvas.getContext("2d");
-    const scale = canvas.width / canvas.clientWidth;
-    const right = canvas.clientWidth - MARGIN.right;
-    const bottom = canvas.clientHeight - MARGIN.bottom;
-    const colour = context.strokeStyle.match(/[0-9a-f]{2}/g).map((one) => parseInt(one, 16));
+    const scale = canvas.width / outer.width;
+    const colour = getComputedStyle(plot).getPropertyValue(`--series-${plot.dataset.series}`)
+        .match(/[0-9a-f]{2}/g).map((one) => parseInt(one, 16));
     return xs.map((_, at) => at).filter((at) => {
-        const x = MARGIN.left + (xs[at] - from) / (to - from) * (right - MARGIN.left);
-        const y = bottom - (values[at] - low) / (high - low) * (bottom - MARGIN.top);
+        const x = inner.left - outer.left + (xs[at] - from) / (to - from) * inner.width;
+        const y = inner.bottom - outer.top - (values[at] - low) / (high - low) * inner.height;
         const { data } = context.getImageData(
             Math.floor(x * scale) - 1, Math.floor(y * scale) - 1, 3, 3);
         for (let n = 0; n < data.length; n += 4) {
@@ -486,6 +489,7 @@ def scope_of(page):
     return scope
 
 
+@PLOTS
 def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(served, page):
     scope = scope_of(page)
     scope.locator("[name=share]").select_option("10")
@@ -519,7 +523,7 @@ def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(se
     scope.get_by_label("Cursor A").focus()
     page.keyboard.press("ArrowRight")
     see(page, "#scope tbody", written(time_ms[65], 3, "ms"))
-    chart = scope.locator("canvas").first
+    chart = scope.locator(".plot").first
     chart.click(position={"x": chart.bounding_box()["width"] - 9, "y": 20})
     see(page, "#scope tbody", written(time_ms[127], 3, "ms"))
     with page.expect_download() as download:
@@ -534,13 +538,14 @@ def test_a_record_of_the_scope_is_drawn_read_by_cursors_and_exported_as_it_is(se
     box = scope.get_by_role("checkbox", name="Drive command")
     box.focus()
     page.keyboard.press("Enter")
-    assert scope.locator("canvas:visible").count() == 2
+    assert scope.locator(".plot:visible").count() == 2
     page.set_viewport_size({"width": 380, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") <= 380
     page.set_viewport_size({"width": 1280, "height": 1000})
     box.check()
 
 
+@PLOTS
 def test_a_record_of_ticks_is_triggered_by_any_signal_and_has_what_came_before(ticking, context):
     page = opened(context, ticking.door.url)
     scope = page.locator("#scope")
@@ -583,6 +588,7 @@ def test_a_record_of_ticks_is_triggered_by_any_signal_and_has_what_came_before(t
     page.close()
 
 
+@PLOTS
 def test_a_stream_is_drawn_while_it_goes_on_until_it_is_ended(ticking, context):
     page = opened(context, ticking.door.url)
     scope = page.locator("#scope")
@@ -593,7 +599,7 @@ def test_a_stream_is_drawn_while_it_goes_on_until_it_is_ended(ticking, context):
     scope.get_by_label("One every").fill("10ms")
     scope.get_by_role("button", name="Stream").click()
     see(page, "#scope figcaption", "Error in µm over ms")
-    drawn = "#scope canvas[data-signal='Error']"
+    drawn = "#scope .plot[data-signal='Error']"
     first = page.locator(drawn).get_attribute("aria-label")
     page.locator(f"{drawn}:not([aria-label='{first}'])").wait_for()
     assert scope.get_by_role("button", name="Export CSV").is_disabled()
@@ -608,6 +614,45 @@ def test_a_stream_is_drawn_while_it_goes_on_until_it_is_ended(ticking, context):
     scope.locator("[name=view]").select_option("spectrum")
     see(page, "#scope .note", "Largest line of the error")
     page.close()
+
+
+def test_a_line_is_interrupted_where_samples_are_missing(page):
+    found = page.evaluate(
+        """async () => {
+            const { History } = await import("/page/history.js");
+            const history = new History();
+            const row = { target_nm: 0, position_nm: 0, velocity_mm_s: 0, drive_command: 0 };
+            for (const time_s of [1, 1.1, 1.1, 3, 140]) history.add({ ...row, time_s });
+            const kept = history.columns[0].slice();
+            for (const time_s of [2, 2.25, 2.75]) history.add({ ...row, time_s });
+            history.add({ ...row, time_s: 4, position_nm: -2000 });
+            return [kept, history.since(2.2).slice(0, 2)];
+        }"""
+    )
+    assert found == [[140, 140], [[2.25, 2.75, 4, 4], [0, 0, None, 2]]]
+
+
+def test_without_uplot_the_page_says_what_to_run_and_everything_else_works(
+    browser, context, tmp_path, monkeypatch
+):
+    static = live_page.files("moire.web").joinpath("static")
+    (tmp_path / "static").symlink_to(static)
+    monkeypatch.setattr(live_page, "files", lambda package: tmp_path)
+    served = Served(homed())
+    page = opened(context, served.door.url)
+    try:
+        see(page, "#plots", "There are no plots, since this server has no uPlot: run “make page”")
+        assert page.locator("#plots .absent").count() == 1 and page.locator(".plot").count() == 0
+        scope = scope_of(page)
+        scope.get_by_role("button", name="Record").click()
+        see(page, "#scope .message", "waiting for the trigger")
+        move(page, "0.3", "Move by")
+        see(page, "#scope .message", "128 samples of axis 1.0")
+        see(page, "#scope .absent", "make page")
+        see(page, "#scope tbody", "Position")
+    finally:
+        page.close()
+        served.end()
 
 
 def test_the_scope_has_one_owner_who_may_give_it_up_and_another_page_may_take_it(
@@ -630,6 +675,7 @@ def test_the_scope_has_one_owner_who_may_give_it_up_and_another_page_may_take_it
     other.close()
 
 
+@PLOTS
 def test_sine_and_cosine_are_drawn_with_their_ellipse_and_what_to_do(served, page):
     signal = page.locator("#signal")
     measure = signal.get_by_role("button", name="Measure")
@@ -637,7 +683,7 @@ def test_sine_and_cosine_are_drawn_with_their_ellipse_and_what_to_do(served, pag
     see(page, "#signal .message", "No ellipse: too few different samples: 1 of")
     turning(served.node)
     see(page, "#signal .message", "ADC counts, which is good: the limits are 32 to 160")
-    signal.locator("canvas[aria-label*='samples and their ellipse']").wait_for()
+    signal.locator(".plot[aria-label*='samples and their ellipse']").wait_for()
     assert "Quadrature error" in signal.locator("dl").inner_text()
     page.set_viewport_size({"width": 380, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") <= 380
@@ -651,10 +697,11 @@ def test_sine_and_cosine_are_drawn_with_their_ellipse_and_what_to_do(served, pag
     measure.click()
 
 
+@PLOTS
 def test_the_amplitude_along_the_travel_is_drawn_with_its_limits(served, page):
     turning(served.node)
     page.locator("#signal").get_by_role("button", name="Measure").click()
-    chart = page.locator("#signal canvas[aria-label^='Amplitude along the travel']")
+    chart = page.locator("#signal .plot[aria-label^='Amplitude along the travel']")
     chart.filter().wait_for()
     assert chart.get_attribute("aria-label").endswith("ADC counts; the limits are 32 and 160")
     shown = json.loads(chart.get_attribute("data-range"))
@@ -662,6 +709,7 @@ def test_the_amplitude_along_the_travel_is_drawn_with_its_limits(served, page):
     page.locator("#signal").get_by_role("button", name="Measure").click()
 
 
+@PLOTS
 def test_a_calibration_shows_its_progress_its_harmonics_and_the_segment_table(browser, context):
     node = node_with_signal()
     node.home()
@@ -674,11 +722,11 @@ def test_a_calibration_shows_its_progress_its_harmonics_and_the_segment_table(br
         panel.get_by_role("button", name="Calibrate").click()
         see(page, "#calibration .message", "the correction is complete and frozen. Strokes")
         see(page, "#calibration .message", "Segment table: linear")
-        bars = panel.locator("canvas[aria-label^='Harmonics that are corrected']")
+        bars = panel.locator(".plot[aria-label^='Harmonics that are corrected']")
         with served.http() as client:
             now = client.done("GET", f"{AXIS}/calibration")["now_nm"]
         assert ", ".join(f"{one:.3f}" for one in now) in bars.get_attribute("aria-label")
-        scale = panel.locator("canvas[aria-label^='Error of the scale at 3 borders']")
+        scale = panel.locator(".plot[aria-label^='Error of the scale at 3 borders']")
         assert "-50.0 to 100.0 nm" in scale.get_attribute("aria-label")
         page.set_viewport_size({"width": 380, "height": 800})
         assert page.evaluate("document.documentElement.scrollWidth") <= 380
@@ -788,6 +836,7 @@ def test_the_statistics_of_the_bus_are_shown(served, page):
 def test_everything_that_can_be_pressed_has_a_name(page):
     nameless = page.evaluate(
         """[...document.querySelectorAll("button, input, select, canvas, [role=img]")]
+           .filter(one => !one.parentElement.closest("[role=img]"))
            .filter(one => one.offsetParent !== null)
            .filter(one => !(one.getAttribute("aria-label") || one.labels?.length ||
                             one.textContent.trim()))
@@ -803,8 +852,9 @@ def test_numbers_are_written_as_people_read_them(page):
         "format.signed(-0.00001, 3)": "0.000",
         "format.signed(2, 1)": "+2.0",
         "format.lengthOf(' −.5 ', 'um')": "-.5 um",
-        "plot.ticks(-1.2, 2.1, 4)": ["-1", "0", "1", "2"],
-        "plot.ticks(0.0499, 0.0521, 4)": ["0.050", "0.051", "0.052"],
+        "[-1.2, 0, 0.7].map(one => plot.label(one, 0.1))": ["−1.2", "0.0", "0.7"],
+        "[0.0475, 0.05].map(one => plot.label(one, 0.0025))": ["0.0475", "0.0500"],
+        "[-1e-9, 2000].map(one => plot.label(one, 500))": ["0", "2000"],
     }
     found = page.evaluate(
         f"""async () => {{

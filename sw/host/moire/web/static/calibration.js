@@ -2,7 +2,7 @@
 // Calibration of an axis with its progress, the harmonics that were and are corrected, and the
 // segment table of its scale.
 
-import { drawBars, drawOver, figure, redrawn } from "./bars.js";
+import { Bars, Over } from "./bars.js";
 import { lengthOf, sentence } from "./format.js";
 import { pathOf } from "./link.js";
 
@@ -25,10 +25,8 @@ export class CalibrationPanel {
     this.form = section.querySelector("form");
     this.message = section.querySelector(".message");
     this.charts = section.querySelector(".charts");
-    this.bars = figure(this.charts, "Amplitude of the harmonics that are corrected, in nm over their order: before (left) and now (right)");
-    this.segments = figure(this.charts, "Error of the scale in the segment table, in nm over the position in mm");
-    redrawn(this.bars, () => this.draw());
-    redrawn(this.segments, () => this.draw());
+    this.bars = new Bars(this.charts, "Amplitude of the harmonics that are corrected, in nm over their order: before (left) and now (right)");
+    this.segments = new Over(this.charts, "Error of the scale in the segment table, in nm over the position in mm", { isLine: true });
     this.form.addEventListener("submit", (event) => {
       event.preventDefault();
       this.calibrate();
@@ -99,19 +97,20 @@ export class CalibrationPanel {
     if (this.found === null || this.charts.hidden) return;
     const { orders, before_nm: before, now_nm: now } = this.found;
     const say = (values) => values.map((one) => one.toFixed(3)).join(", ") || "unknown";
-    drawBars(this.bars, orders, [before.length ? before : now.map(() => 0), now]);
-    this.bars.setAttribute(
-      "aria-label",
+    this.bars.show(
+      orders,
+      [before.length ? before : now.map(() => 0), now],
       `Harmonics that are corrected, in nm by order from 1: before ${say(before)}; now ${say(now)}`,
     );
     const hasTable = Boolean(this.table?.border_nm.length);
-    this.segments.closest("figure").hidden = !hasTable;
+    this.segments.figure.hidden = !hasTable;
     if (!hasTable) return;
-    drawOver(this.segments, this.table.border_nm.map((one) => one / 1e6), this.table.error_nm, { isLine: true });
-    const [low, high] = [Math.min(...this.table.error_nm), Math.max(...this.table.error_nm)];
-    this.segments.setAttribute(
-      "aria-label",
-      `Error of the scale at ${this.table.error_nm.length} borders: from ${low.toFixed(1)} to ${high.toFixed(1)} nm`,
+    const { border_nm: borders, error_nm: errors } = this.table;
+    const [low, high] = [Math.min(...errors), Math.max(...errors)].map((one) => one.toFixed(1));
+    this.segments.show(
+      borders.map((one) => one / 1e6),
+      errors,
+      `Error of the scale at ${errors.length} borders: from ${low} to ${high} nm`,
     );
   }
 }

@@ -4,11 +4,12 @@
 import { AxisView } from "./axis.js";
 import { BusPanel } from "./bus.js";
 import { CalibrationPanel } from "./calibration.js";
+import { History, QUANTITIES } from "./history.js";
 import { releaseAll } from "./hold.js";
 import { JobPanel } from "./job.js";
 import { Link } from "./link.js";
+import { LivePlot } from "./live.js";
 import { ParameterTable } from "./parameters.js";
-import { History, Plot, QUANTITIES } from "./plot.js";
 import { ScopePanel } from "./scope.js";
 import { SetupPanel } from "./setup.js";
 import { SignalPanel } from "./signal.js";
@@ -160,7 +161,9 @@ at("access").addEventListener("submit", (event) => {
 
 // ------------------------------------------------------------------ plots
 
-const plots = QUANTITIES.map((quantity, index) => new Plot(quantity, index, at("charts")));
+const plots = QUANTITIES.map(
+  (quantity, index) => new LivePlot(quantity, index + 1, at("charts")),
+);
 let frozen = false;
 let drawn = 0;
 let described = -Infinity;
@@ -174,13 +177,13 @@ function draw(now) {
   requestAnimationFrame(draw);
   if (now - drawn < DRAW_MS || at("plots").hidden) return;
   drawn = now;
-  const ends = [...histories.values()].map((history) => history.rows.at(-1)?.[0] ?? 0);
   const span = Number(at("span").value);
-  const end = Math.max(...ends);
-  for (const plot of plots) plot.draw(histories, end, span);
+  const end = Math.max(...[...histories.values()].map((history) => history.end ?? 0));
+  const columns = [...histories.values()].map((history) => history.since(end - span));
+  for (const plot of plots) plot.show(columns, end, span);
   if (now - described < DESCRIBE_MS) return;
   described = now;
-  for (const plot of plots) plot.describe(histories, end, span);
+  for (const plot of plots) plot.say([...histories.keys()], columns, span);
 }
 
 requestAnimationFrame(draw);

@@ -1,175 +1,148 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plots over time on a canvas: one quantity of all axes each.
+// A figure with a diagram, which uPlot draws in the colours and letters of the page.
 
-const LONGEST_S = 125; // of the machine's time, that is kept
-const GAP_S = 0.5; // without samples: the line is interrupted
-export const MARGIN = { left: 64, right: 8, top: 8, bottom: 22 };
-export const DASHES = [[], [6, 3], [2, 2], [8, 3, 2, 3]];
+const DASHES = [[], [6, 3], [2, 2], [8, 3, 2, 3]];
+const ABSENT =
+  "There are no plots, since this server has no uPlot: run “make page” in its checkout of Moire, " +
+  "start the server again, and load this page again.";
 
-export const QUANTITIES = [
-  { name: "Error", unit: "µm", of: (row) => (row.target_nm - row.position_nm) / 1e3 },
-  { name: "Position", unit: "mm", of: (row) => row.position_nm / 1e6 },
-  { name: "Velocity", unit: "mm/s", of: (row) => row.velocity_mm_s },
-  { name: "Drive command", unit: "%", of: (row) => 100 * row.drive_command },
-];
+/** uPlot, which is fetched beside everything else; null where the server does not have it. */
+const library = Promise.all([import("./uplot/uPlot.esm.js"), style("/page/uplot/uPlot.min.css")])
+  .then(([module]) => module.default)
+  .catch(() => null);
 
-/** The samples of an axis, the oldest first. */
-export class History {
-  constructor() {
-    this.rows = []; // [time, value of each quantity]
-  }
-
-  add(row) {
-    const last = this.rows.at(-1)?.[0] ?? -Infinity;
-    if (row.time_s < last) this.rows = []; // another machine
-    if (row.time_s === last) return;
-    this.rows.push([row.time_s, ...QUANTITIES.map((quantity) => quantity.of(row))]);
-    if (this.rows[0][0] < row.time_s - LONGEST_S) {
-      this.rows.splice(0, this.rows.findIndex(([time]) => time >= row.time_s - LONGEST_S));
-    }
-  }
-
-  /** The samples from a time on. */
-  since(time) {
-    let low = 0;
-    let high = this.rows.length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.rows[middle][0] < time) low = middle + 1;
-      else high = middle;
-    }
-    return this.rows.slice(low);
-  }
-}
-
-/** Round numbers in a range, about so many. */
-export function ticks(low, high, count) {
-  const rough = (high - low) / count;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((one) => one >= rough);
-  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  const found = [];
-  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + step * 1e-9; n++) {
-    found.push((n * step).toFixed(digits).replace(/^-(0\.?0*)$/, "$1"));
-  }
-  return found;
+function style(href) {
+  return new Promise((onload, onerror) => {
+    const rel = "stylesheet";
+    document.head.append(Object.assign(document.createElement("link"), { rel, href, onload, onerror }));
+  });
 }
 
 /** A range with a margin around it; never empty. */
 export function widened(low, high) {
-  if (low > high) return [-1, 1];
+  if (low === null) return [-1, 1];
   const margin = 0.06 * (high - low) || Math.max(Math.abs(high) * 1e-6, 1e-3);
   return [low - margin, high + margin];
 }
 
-/** The range of the values with a margin. */
-function rangeOf(lists, index) {
-  let low = Infinity;
-  let high = -Infinity;
-  for (const rows of lists) {
-    for (const row of rows) {
-      if (row[index] < low) low = row[index];
-      if (row[index] > high) high = row[index];
-    }
-  }
-  return widened(low, high);
+/** A number at an axis whose numbers are one `step` apart. */
+export function label(value, step) {
+  const power = Math.floor(Math.log10(step) + 1e-9);
+  const isWhole = Math.abs(step / 10 ** power - Math.round(step / 10 ** power)) < 1e-6; // not 2.5
+  const text = Math.abs(value).toFixed(Math.max(0, -power + (isWhole ? 0 : 1)));
+  return `${value < 0 && Number(text) !== 0 ? "−" : ""}${text}`;
 }
 
-/** Clears a canvas and draws the axes of a diagram; `marks` are [value, text] below it. Returns the
- *  context, its style, and the functions from values to pixels; null while it is not shown. */
-export function frame(canvas, { from, to, low, high, marks }) {
-  const scale = window.devicePixelRatio || 1;
-  const width = canvas.clientWidth;
-  const height = canvas.clientHeight;
-  if (!width || !height) return null;
-  if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) {
-    canvas.width = Math.round(width * scale);
-    canvas.height = Math.round(height * scale);
-  }
-  const style = getComputedStyle(canvas);
-  const context = canvas.getContext("2d");
-  context.setTransform(scale, 0, 0, scale, 0, 0);
-  context.clearRect(0, 0, width, height);
-  const right = width - MARGIN.right;
-  const bottom = height - MARGIN.bottom;
-  const x = (value) => right - ((to - value) / (to - from)) * (right - MARGIN.left);
-  const y = (value) => bottom - ((value - low) / (high - low)) * (bottom - MARGIN.top);
-  context.font = style.font;
-  context.lineWidth = 1;
-  context.strokeStyle = style.getPropertyValue("--grid");
-  context.fillStyle = style.color;
-  context.beginPath();
-  context.textAlign = "right";
-  context.textBaseline = "middle";
-  for (const text of ticks(low, high, 4)) {
-    const at = Math.round(y(Number(text))) + 0.5;
-    context.moveTo(MARGIN.left, at);
-    context.lineTo(right, at);
-    context.fillText(text.replace("-", "−"), MARGIN.left - 6, at);
-  }
-  context.textBaseline = "bottom";
-  for (const [value, text] of marks) {
-    const at = Math.round(x(value)) + 0.5;
-    context.moveTo(at, MARGIN.top);
-    context.lineTo(at, bottom);
-    const half = context.measureText(text).width / 2;
-    context.textAlign = at + half > width ? "right" : "center";
-    context.fillText(text, at, height);
-  }
-  context.stroke();
-  context.lineWidth = 1.5;
-  return { context, style, x, y, top: MARGIN.top, bottom };
+/** The look of the series of a number from 0 on: options of uPlot. `color` gives its colour. */
+export function line(number, color) {
+  return {
+    stroke: color(number),
+    width: 1.5,
+    pxAlign: 0, // exactly where the samples are
+    dash: DASHES[number % DASHES.length].map((one) => one * devicePixelRatio),
+    points: { show: false },
+  };
+}
+
+/** The same with a dot at each sample. */
+export function dots(number, color, uPlot) {
+  return {
+    fill: color(number),
+    width: 0,
+    paths: uPlot.paths.points(),
+    points: { show: false, size: 3, width: 0 },
+  };
+}
+
+/** Options of uPlot for series that have abscissae of their own: the data is [null, [xs, ys], …]. */
+export function ownAbscissae(series) {
+  const facets = () => [{ scale: "x", auto: true }, { scale: "y", auto: true }];
+  return { mode: 2, series: [null, ...series.map((one) => ({ ...one, facets: facets() }))] };
 }
 
 export class Plot {
-  constructor(quantity, index, parent) {
-    this.quantity = quantity;
-    this.index = index + 1; // in the rows of a history
-    const figure = document.createElement("figure");
+  /** `options({ uPlot, color })` gives those options of uPlot that are its own, at least `series`;
+   *  `x` and `y` in them are options of the axes. It is asked again when size or colours change. */
+  constructor(parent, title, options) {
+    Object.assign(this, { parent, options, drawn: null, data: null, uPlot: null });
+    this.figure = document.createElement("figure");
     this.caption = document.createElement("figcaption");
-    this.canvas = document.createElement("canvas");
-    this.canvas.setAttribute("role", "img");
-    figure.append(this.caption, this.canvas);
-    parent.append(figure);
-    this.caption.textContent = `${quantity.name} in ${quantity.unit}`;
+    this.element = document.createElement("div");
+    this.element.className = "plot";
+    this.element.setAttribute("role", "img");
+    this.element.owner = this;
+    this.figure.append(this.caption, this.element);
+    parent.append(this.figure);
+    this.caption.textContent = title;
+    library.then((found) => this.begin(found));
   }
 
-  /** Draws the last `span` seconds of the histories, by name. */
-  draw(histories, end, span) {
-    const lists = [...histories.values()].map((history) => history.since(end - span));
-    const [low, high] = rangeOf(lists, this.index);
-    const marks = ticks(-span, 0, 4).map((text) => [
-      end + Number(text),
-      Number(text) === 0 ? "now" : `${text.replace("-", "−")} s`,
-    ]);
-    const drawn = frame(this.canvas, { from: end - span, to: end, low, high, marks });
-    if (drawn === null) return;
-    const { context, style, x, y } = drawn;
-    lists.forEach((rows, number) => {
-      context.strokeStyle = style.getPropertyValue(`--series-${(number % 4) + 1}`);
-      context.setLineDash(DASHES[number % DASHES.length]);
-      context.beginPath();
-      let last = -Infinity;
-      for (const row of rows) {
-        if (row[0] - last > GAP_S) context.moveTo(x(row[0]), y(row[this.index]));
-        else context.lineTo(x(row[0]), y(row[this.index]));
-        last = row[0];
+  begin(uPlot) {
+    this.uPlot = uPlot;
+    if (uPlot !== null) new ResizeObserver(() => this.build()).observe(this.element);
+    else {
+      this.figure.remove();
+      if (!this.parent.querySelector(".absent")) {
+        this.parent.insertAdjacentHTML("beforeend", `<p class="note absent">${ABSENT}</p>`);
       }
-      context.stroke();
-      context.setLineDash([]);
-    });
+    }
   }
 
-  /** Says in words what the plot shows. */
-  describe(histories, end, span) {
-    const said = [...histories].map(([name, history]) => {
-      const values = history.since(end - span).map((row) => row[this.index]);
-      if (!values.length) return `axis ${name} has no samples`;
-      const [low, high] = [Math.min(...values), Math.max(...values)].map((one) => one.toFixed(3));
-      return `axis ${name} from ${low} to ${high}`;
-    });
-    const { name, unit } = this.quantity;
-    const text = `${name} in ${unit} over the last ${span} s: ${said.join("; ")}`;
-    this.canvas.setAttribute("aria-label", text);
+  /** Draws this data of uPlot; `words` say what it shows. */
+  draw(data, words) {
+    const isAlike = this.drawn !== null && this.data.length === data.length;
+    this.data = data;
+    if (words !== undefined) this.describe(words);
+    if (isAlike) this.drawn.setData(data);
+    else this.build();
+  }
+
+  describe(words) {
+    this.element.setAttribute("aria-label", words);
+  }
+
+  /** Makes the diagram from scratch, in the size and the colours that the page has now. */
+  build() {
+    this.drawn?.destroy();
+    this.drawn = null;
+    const { clientWidth: width, clientHeight: height } = this.element;
+    if (!this.uPlot || !this.data || !width || !height) return;
+    const look = getComputedStyle(this.element);
+    const color = (number) => look.getPropertyValue(`--series-${(number % 4) + 1}`);
+    const { x, y, scales, hooks, ...own } = this.options({ uPlot: this.uPlot, color });
+    const letter = Math.round(parseFloat(look.fontSize));
+    const axis = {
+      stroke: look.color,
+      font: `${letter}px ${look.fontFamily}`,
+      grid: { stroke: look.getPropertyValue("--grid"), width: 1 },
+      ticks: { show: false },
+      values: (plot, values, number, space, step) => values.map((value) => label(value, step)),
+    };
+    const options = {
+      width,
+      height,
+      padding: [8, 1.5 * letter, 0, 0],
+      legend: { show: false },
+      cursor: { show: false },
+      axes: [
+        { ...axis, size: 2 * letter, gap: 4, space: 6 * letter, ...x },
+        { ...axis, size: 5.5 * letter, gap: 6, space: 2.5 * letter, ...y },
+      ],
+      ...own,
+      scales: { x: { time: false }, y: { range: (plot, low, high) => widened(low, high) } },
+      hooks: { draw: [(plot) => this.note(plot), ...(hooks?.draw ?? [])] },
+    };
+    for (const name in scales) Object.assign(options.scales[name], scales[name]);
+    this.drawn = new this.uPlot(options, this.data, this.element);
+  }
+
+  /** Keeps what is drawn where a program can read it. */
+  note({ scales: { x, y } }) {
+    const range = { from: x.min, to: x.max, low: y.min, high: y.max };
+    this.element.dataset.range = JSON.stringify(range);
   }
 }
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  for (const element of document.querySelectorAll(".plot")) element.owner.build();
+});

@@ -26,7 +26,6 @@ const UNITS = [ // of the ends of names of columns: unit, scale, digits
   ["_periods", "periods", 1, 4],
   ["_bits", "bits", 1, 0],
 ];
-const SERIES = 4; // colours
 
 /** The signal of a column: its name in words, unit, scale, digits. */
 function signalOf(key, number) {
@@ -34,7 +33,7 @@ function signalOf(key, number) {
   const name = (end.startsWith("_") ? key.slice(0, -end.length) : key.replace(/_nm$/, ""))
     .replace(/_/g, " ")
     .replace(/^\w/, (letter) => letter.toUpperCase());
-  return { name, key, unit, scale, digits, series: (number % SERIES) + 1 };
+  return { name, key, unit, scale, digits, series: number };
 }
 const POSITION_SHARES = [0, 10, 25, 50, 90]; // of the samples, before the trigger
 const COUNTS = [128, 64, 32, 16]; // samples of the scope of a node
@@ -126,8 +125,6 @@ export class ScopePanel {
     this.sliders.forEach((slider, number) => {
       slider.oninput = () => this.moveCursor(number, Number(slider.value));
     });
-    new ResizeObserver(() => this.draw()).observe(this.result);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
 
   open(names, mayChange) {
@@ -416,11 +413,11 @@ export class ScopePanel {
     const rows = [rowOf(name, unit, this.cursors.map((at) => xs[at]), digits)];
     this.signals.forEach((signal, index) => {
       const chart = this.charts[index];
-      chart.canvas.parentElement.hidden = !this.boxes[index].checked;
+      chart.figure.hidden = !this.boxes[index].checked;
       if (!this.boxes[index].checked) return;
       const values = this.valuesOf(signal);
       const title = isSpectrum ? `${signal.name}, amplitude` : signal.name;
-      chart.draw({ xs, values, unit, cursors: this.cursors, title });
+      chart.show({ xs, values, unit, cursors: this.cursors, title });
       rows.push(rowOf(signal.name, signal.unit, this.cursors.map((at) => values[at]), signal.digits));
     });
     this.rows.replaceChildren(...rows);

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sine against cosine of an axis while it moves, the ellipse through the samples, and what to do.
 
-import { drawOver, figure } from "./bars.js";
+import { Over } from "./bars.js";
 import { sentence, signed } from "./format.js";
 import { pathOf } from "./link.js";
-import { frame, ticks } from "./plot.js";
+import { dots, line, ownAbscissae, Plot } from "./plot.js";
 
 const SAMPLES = 32; // of one request
 const PAUSE_MS = 150; // between two requests
 
 export class SignalPanel {
   constructor(section, link) {
-    Object.assign(this, { section, link, turn: 0, found: null });
+    Object.assign(this, { section, link, turn: 0, reach: 1 });
     section.innerHTML = `
       <div class="bar">
         <h2 id="signal-title">Sine and cosine</h2>
@@ -21,8 +21,7 @@ export class SignalPanel {
       <p class="note">Move the axis by some signal periods while this measures.</p>
       <p class="message" role="status"></p>
       <div class="lissajous" hidden>
-        <figure><figcaption>Sine over cosine in ADC counts</figcaption>
-          <canvas class="square" role="img"></canvas></figure>
+        <div data-field="ellipse"></div>
         <dl></dl>
         <div data-field="travel"></div>
       </div>`;
@@ -30,16 +29,19 @@ export class SignalPanel {
     this.button = section.querySelector("button");
     this.message = section.querySelector(".message");
     this.result = section.querySelector(".lissajous");
-    this.canvas = section.querySelector("canvas");
     this.list = section.querySelector("dl");
-    this.travel = figure(
+    this.ellipse = new Plot(
+      section.querySelector("[data-field=ellipse]"),
+      "Sine over cosine in ADC counts",
+      (look) => this.lissajous(look),
+    );
+    this.ellipse.element.classList.add("square");
+    this.travel = new Over(
       section.querySelector("[data-field=travel]"),
       "Amplitude in ADC counts over the position in mm, with its limits",
     );
     this.button.onclick = () => (this.turn ? this.end() : this.measure());
     this.axis.onchange = () => this.end();
-    new ResizeObserver(() => this.draw()).observe(this.canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
 
   open(names) {
@@ -80,7 +82,6 @@ export class SignalPanel {
   }
 
   show(found) {
-    this.found = found;
     const isBad = !["good", "unknown"].includes(found.verdict);
     this.say(`${found.words}.${found.to_do ? ` What to do: ${found.to_do}.` : ""}`, isBad);
     this.result.hidden = false;
@@ -106,39 +107,31 @@ export class SignalPanel {
         return row;
       }),
     );
-    this.canvas.setAttribute(
-      "aria-label",
-      `Sine over cosine in ADC counts: ${found.cos.length} samples` +
+    const { cos, sin, curve } = found;
+    this.reach = 1.1 * Math.max(1, ...[...cos, ...sin, ...curve.cos, ...curve.sin].map(Math.abs));
+    this.ellipse.draw(
+      [null, [curve.cos, curve.sin], [cos, sin]],
+      `Sine over cosine in ADC counts: ${cos.length} samples` +
         `${ellipse ? " and their ellipse" : ""}. ${found.words}`,
     );
-    this.draw();
-  }
-
-  draw() {
-    if (!this.found) return;
-    const { cos, sin, curve } = this.found;
-    const all = [...cos, ...sin, ...curve.cos, ...curve.sin].map(Math.abs);
-    const reach = 1.1 * Math.max(1, ...all);
-    const marks = ticks(-reach, reach, 4).map((text) => [Number(text), text.replace("-", "−")]);
-    const range = { from: -reach, to: reach, low: -reach, high: reach };
-    this.canvas.dataset.range = JSON.stringify(range);
-    const drawn = frame(this.canvas, { ...range, marks });
-    if (drawn === null) return;
-    const { context, style, x, y } = drawn;
-    context.strokeStyle = style.getPropertyValue("--series-2");
-    context.beginPath();
-    curve.cos.forEach((value, at) => context.lineTo(x(value), y(curve.sin[at])));
-    context.stroke();
-    context.fillStyle = style.getPropertyValue("--series-1");
-    cos.forEach((value, at) => context.fillRect(x(value) - 1, y(sin[at]) - 1, 2, 2));
-    const { amplitude, position_nm: positions, limits } = this.found;
+    const { amplitude, position_nm: positions, limits } = found;
     if (!amplitude.length) return;
-    drawOver(this.travel, positions.map((one) => one / 1e6), amplitude, { limits });
-    this.travel.setAttribute(
-      "aria-label",
+    this.travel.show(
+      positions.map((one) => one / 1e6),
+      amplitude,
       `Amplitude along the travel: ${amplitude.length} samples, ${Math.min(...amplitude)} to ` +
         `${Math.max(...amplitude)} ADC counts` +
         (limits.length ? `; the limits are ${limits.join(" and ")}` : ""),
+      limits,
     );
+  }
+
+  /** Options of uPlot for the samples and their ellipse, which is a closed line. */
+  lissajous({ uPlot, color }) {
+    const range = () => [-this.reach, this.reach];
+    return {
+      ...ownAbscissae([{ ...line(1, color), dash: [] }, dots(0, color, uPlot)]),
+      scales: { x: { range }, y: { range } },
+    };
   }
 }
