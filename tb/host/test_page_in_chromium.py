@@ -452,6 +452,7 @@ def test_the_plots_and_the_parameters_show_what_the_axis_does_at_every_width(ser
 # the samples whose place in a chart has no pixel of its colour within one pixel
 NOT_DRAWN = """async ([name, xs, values]) => {
     const plot = document.querySelector(`.plot[data-signal="${name}"]`);
+    while (!plot.querySelector(".u-over")) await new Promise(requestAnimationFrame);
     const canvas = plot.querySelector("canvas");
     const outer = canvas.getBoundingClientRect();
     const inner = plot.querySelector(".u-over").getBoundingClientRect();
