@@ -7,7 +7,7 @@ import pytest
 
 from moire.client.nonvolatile import SavedSettings
 from moire.errors import MotionFailed, Refused
-from moire.made.bus_tables import CAUSES
+from moire.made.bus_tables import CAUSES, PARAMETERS
 from tb.host.test_host_job import Workshop
 
 
@@ -43,6 +43,54 @@ def test_the_commands_save_clear_and_report(workshop):
         )
         == 2
     )
+
+
+def test_what_differs_from_the_saved_values_is_shown(workshop):
+    def differences():
+        code, out, _ = workshop.call("params diff --saved --json")
+        assert code == 0
+        return [tuple(one.values()) for one in json.loads(out)["differences"]]
+
+    known = workshop.saved.parameters(0)
+    assert known == {name: one.default for name, one in PARAMETERS.items()}
+    workshop.station.set(kp=7, jerk=4242, travel_low=-(1 << 40))
+    assert sorted(name for name, *_ in differences()) == ["jerk", "kp", "travel_low"]
+    workshop.saved.save()
+    assert workshop.saved.parameters(0) == {
+        **known,
+        **{"kp": 7, "jerk": 4242, "travel_low": -(1 << 40)},
+    }
+    assert workshop.call("params diff --saved")[1].endswith("all parameters agree\n")
+    workshop.station.set(kp=8)
+    ((name, value, saved),) = differences()
+    assert name == "kp" and float(value) > float(saved) > 0
+    workshop.station.power_cut()
+    assert differences() == []
+    workshop.saved.restore_defaults()
+    assert sorted(name for name, *_ in differences()) == ["jerk", "kp", "travel_low"]
+    assert workshop.call("params diff --saved stage.toml")[0] == 2
+
+
+def test_saved_values_of_another_axis_and_settings_are_left_out(workshop):
+    workshop.station.set(kp=7)
+    workshop.station.setting(turn_frames=9)
+    workshop.saved.save()
+    assert workshop.saved.parameters(1) == {name: one.default for name, one in PARAMETERS.items()}
+
+
+def test_values_that_cannot_be_read_are_no_defaults(workshop):
+    workshop.saved.save()
+    with pytest.raises(Refused, match="outside the range"):
+        workshop.saved._value(1)
+    eeprom = workshop.station.bus.devices.pop(0x50)
+    with pytest.raises(Refused, match="the EEPROM does not answer"):
+        workshop.saved.parameters(0)
+    workshop.station.power_cut()
+    workshop.station.run(300)
+    with pytest.raises(MotionFailed, match="node 2 did not read its values: the saved values were"):
+        workshop.saved.parameters(0)
+    assert workshop.call("params diff --saved")[0] != 0
+    workshop.station.bus.devices[0x50] = eeprom
 
 
 def test_a_damaged_copy_is_reported(workshop):

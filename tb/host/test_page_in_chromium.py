@@ -436,6 +436,9 @@ def test_the_plots_and_the_parameters_show_what_the_axis_does_at_every_width(ser
     shown.select_option("default")
     names = page.locator("#parameters tbody tr:visible th").all_inner_texts()
     assert "kp" in names and "velocity" not in names
+    shown.select_option("saved")  # nothing: this node has no EEPROM
+    see(page, "#parameters tr:visible", "; saved: ")
+    assert page.locator("#parameters tbody tr:visible th").all_inner_texts() == names
     page.get_by_role("searchbox").fill("fine_")
     for scheme in ("dark", "light"):
         page.emulate_media(color_scheme=scheme)
@@ -785,9 +788,19 @@ def test_the_first_set_up_is_followed_step_by_step(browser, context):
         served.end()
 
 
+def differing_from_saved(page):
+    """The names of the parameters that differ from the saved ones, as the page shows them."""
+    page.locator("#parameters [name=shown]").select_option("all")
+    page.locator("#parameters [name=shown]").select_option("saved")
+    see(page, "#parameters .message", " parameters")
+    return page.locator("#parameters tbody tr:visible th").all_inner_texts()
+
+
 def test_a_job_is_shown_and_begun(browser, context):
     workshop = Workshop()
     workshop.job.load(["0deg", "1.5deg"])
+    workshop.station.set(kp=1 << 13)
+    workshop.station.save_settings()
     served = Served(workshop.station)
     page = opened(context, served.door.url)
     try:
@@ -795,6 +808,14 @@ def test_a_job_is_shown_and_begun(browser, context):
         page.locator("#job").get_by_role("button", name="Start").click()
         page.locator("#job").get_by_role("button", name="Stop the job").click()
         page.locator("#job").get_by_role("button", name="Start").wait_for()
+        page.locator("#parameters").get_by_role("button", name="Read").click()
+        assert differing_from_saved(page) == []
+        page.locator("#parameters [name=shown]").select_option("all")
+        page.get_by_label(re.compile("^kp, axis")).fill("0.25")
+        page.keyboard.press("Enter")
+        see(page, "#parameters .message", "kp is 0.25")
+        assert differing_from_saved(page) == ["kp"]
+        see(page, "#parameters tr:visible", "; saved: 0.125")
     finally:
         page.close()
         served.end()

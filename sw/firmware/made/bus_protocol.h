@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x6244CA52u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xDD208892u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -581,6 +581,9 @@ enum bus_operation {
     BUS_OPERATION_JOB_ADD = 53,
     // write the new station list and the settings to the EEPROM; job_stations reports the end
     BUS_OPERATION_JOB_SAVE = 54,
+    // one of the saved values, by its number from 0 on, as it is in the EEPROM; owner: an axis, or
+    // 255 for a setting. Refused with eeprom_busy while it is being read: ask again
+    BUS_OPERATION_SAVED_VALUE = 55,
     // save parameters and settings to the EEPROM, or clear them; saved_settings reports the end
     BUS_OPERATION_SAVE_SETTINGS = 58,
     // the saved values, or why there are none; writing is 1 while the EEPROM is written or read;
@@ -1012,6 +1015,12 @@ enum bus_operation {
 #define BUS_JOB_ADD_REPLY_LENGTH 3u
 #define BUS_JOB_SAVE_REQUEST_LENGTH 2u
 #define BUS_JOB_SAVE_REPLY_LENGTH 3u
+#define BUS_SAVED_VALUE_REQUEST_LENGTH 4u
+#define BUS_SAVED_VALUE_REQUEST_NUMBER 2u    // u16
+#define BUS_SAVED_VALUE_REPLY_LENGTH 13u
+#define BUS_SAVED_VALUE_REPLY_OWNER 3u    // u8
+#define BUS_SAVED_VALUE_REPLY_ID 4u    // u8
+#define BUS_SAVED_VALUE_REPLY_VALUE 5u    // i64
 #define BUS_SAVE_SETTINGS_REQUEST_LENGTH 3u
 #define BUS_SAVE_SETTINGS_REQUEST_ACTION 2u    // u8
 #define BUS_SAVE_SETTINGS_REPLY_LENGTH 3u
@@ -1109,6 +1118,7 @@ enum bus_operation {
     X(job_begin, 52, 2, 3, 0) \
     X(job_add, 53, 8, 3, 0) \
     X(job_save, 54, 2, 3, 0) \
+    X(saved_value, 55, 4, 13, 0) \
     X(save_settings, 58, 3, 3, 0) \
     X(saved_settings, 59, 2, 12, 0) \
     X(update_state, 60, 2, 15, 0) \

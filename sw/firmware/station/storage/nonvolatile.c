@@ -12,7 +12,19 @@ static uint8_t save_settings(void) {
                                           : value_store_save(action == BUS_SAVE_ACTION_CLEAR);
 }
 
+static uint8_t saved_value(void) {
+    struct saved_value saved;
+    unsigned number = (unsigned)bus_request_field(BUS_SAVED_VALUE_REQUEST_NUMBER, 2);
+    uint8_t refused = value_store_get(number, &saved);
+    if (refused != BUS_CAUSE_OK) return refused;
+    bus_reply_field(BUS_SAVED_VALUE_REPLY_OWNER, saved.owner, 1);
+    bus_reply_field(BUS_SAVED_VALUE_REPLY_ID, saved.id, 1);
+    bus_reply_field(BUS_SAVED_VALUE_REPLY_VALUE, (uint64_t)saved.value, 8);
+    return BUS_CAUSE_OK;
+}
+
 uint8_t nonvolatile_operation(uint8_t operation) {
+    if (operation == BUS_OPERATION_SAVED_VALUE) return saved_value();
     if (operation == BUS_OPERATION_SAVE_SETTINGS) return save_settings();
     if (operation != BUS_OPERATION_SAVED_SETTINGS) return BUS_CAUSE_NOT_BUILT;
     const struct value_store_status* status = value_store_status();

@@ -29,8 +29,11 @@ static uint8_t phase;
 static uint8_t copy;  // that is read or written
 static uint16_t at;   // byte of the copy
 static uint32_t crc;
-static unsigned cursor;  // of saved_values_next
-static bool final;       // the page that is written is the last one
+static unsigned cursor;         // of saved_values_next
+static bool final;              // the page that is written is the last one
+static struct saved_value got;  // the value that was read last
+static uint16_t got_number;     // its number from 1 on; 0: none
+static uint8_t got_cause;       // how its reading ended
 
 static unsigned address(void) { return AT + copy * COPY_BYTES + at; }
 
@@ -38,6 +41,7 @@ static unsigned address(void) { return AT + copy * COPY_BYTES + at; }
 
 static void reset(void) {
     record_copies_reset(&copies, 1);
+    got_number = 0;
     if (store_powering_up())
         status = (struct value_store_status){.cause = BUS_CAUSE_SAVED_NOT_READ};
     status.damaged = false;
@@ -167,10 +171,34 @@ uint8_t value_store_save(bool nothing) {
     copies.generation[copy] = 0;
     status.generation = record_copies_next_generation();
     status.values = 0;
+    got_number = 0;
     phase = GATHER;
     at = 0;
     crc = UINT32_MAX;
     cursor = nothing ? SAVED_NOTHING : 0;
     store_step();
     return BUS_CAUSE_OK;
+}
+
+// ---- reading one value
+
+static void take_value(void) {
+    __builtin_memcpy(&got, store_bytes, ENTRY);
+    store_end(BUS_CAUSE_OK);
+}
+
+static const struct store_client reader = {.read = take_value, .cause = &got_cause};
+
+uint8_t value_store_get(unsigned number, struct saved_value* value) {
+    if (number >= status.values) return BUS_CAUSE_OUT_OF_RANGE;
+    uint8_t refused = store_may_write();
+    if (refused != BUS_CAUSE_OK) return refused;
+    if (got_number == number + 1) {
+        *value = got;
+        return BUS_CAUSE_OK;
+    }
+    got_number = (uint16_t)(number + 1);
+    store_begin(&reader);
+    store_read(AT + copies.newest * COPY_BYTES + got_number * ENTRY, ENTRY);
+    return BUS_CAUSE_EEPROM_BUSY;
 }

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "station/storage/saved_values.h"
 #include "station/storage/store.h"
 
 #define VALUE_STORE_MAX 254u  // values of a copy
@@ -26,5 +27,9 @@ const struct value_store_status* value_store_status(void);
 // at their defaults from the next power-up on. Returns a bus_cause: ok, eeprom_busy or
 // eeprom_missing; value_store_status reports how the writing ends.
 uint8_t value_store_save(bool nothing);
+
+// Gets one of status.values saved values by its number from 0 on. Returns a bus_cause: ok,
+// eeprom_busy while it is being read, out_of_range, or eeprom_missing.
+uint8_t value_store_get(unsigned number, struct saved_value* value);
 
 #endif

@@ -5,6 +5,7 @@ node with the firmware image `station`.
     saved = SavedSettings(bus.node(2))
     saved.save()                  # all that differs from the defaults; the next power-up uses it
     saved.state().cause           # "ok", or why the defaults are in force
+    saved.parameters(0)           # what the parameters of its axis 0 are after the next power-up
 """
 
 from collections.abc import Sequence
@@ -12,12 +13,14 @@ from dataclasses import dataclass
 
 from moire.client.names import CAUSE_CODES, code_name, descriptions
 from moire.client.node import Node
-from moire.errors import MotionFailed
-from moire.made.bus_tables import CAUSES, SAVE_ACTIONS
+from moire.errors import MotionFailed, Refused
+from moire.made.bus_tables import CAUSES, PARAMETERS, SAVE_ACTIONS
 
 ACTIONS = {name: code for code, (name, _) in SAVE_ACTIONS.items()}
 SAVE_TIMEOUT_S = 10  # a node with two axes needs less than one second
 NOTHING = "nothing_saved"
+IN_FORCE = ("ok", "saved_refused")  # causes with which the next power-up uses what is saved
+DEFAULTS = (NOTHING, "saved_damaged", "saved_other_build")  # and those with which it does not
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,42 @@ class SavedSettings:
         cause = cause_of(reply["writing"], reply["cause"])
         return SavedState(cause, bool(reply["damaged"]), reply["generation"], reply["values"])
 
+    def parameters(self, axis: int) -> dict[str, int]:
+        """The counts of all parameters of an axis after the next power-up: the saved ones, and else
+        the defaults. A node without this memory has the defaults. Raises MotionFailed when what is
+        saved cannot be read.
+        """
+        counts = {name: known.default for name, known in PARAMETERS.items()}
+        try:
+            state = self.state()
+        except Refused as refused:
+            if refused.cause != "not_built":
+                raise
+            return counts
+        if state.cause in DEFAULTS:
+            return counts
+        if state.cause not in IN_FORCE:
+            raise self._failed(state, "read")
+        names = {known.id: name for name, known in PARAMETERS.items()}
+        for number in range(state.values):
+            saved = self._value(number)
+            if saved["owner"] == axis:
+                counts[names[saved["id"]]] = saved["value"]
+        return counts
+
+    def _value(self, number: int) -> dict[str, int]:
+        """One of the saved values, as soon as the node has read it."""
+        transport = self.node.bus.transport
+        began = transport.now()
+        while True:
+            try:
+                return self.node.request("saved_value", number=number)
+            except Refused as refused:
+                is_late = transport.now() - began > SAVE_TIMEOUT_S
+                if refused.cause != "eeprom_busy" or is_late:
+                    raise
+            self.node.bus.until_next_poll(self.node)
+
     def save(self) -> SavedState:
         """Saves the present values; raises MotionFailed with the reason when that fails."""
         return self._do("save", ("ok", NOTHING))
@@ -82,9 +121,12 @@ class SavedSettings:
         self.node.request("save_settings", action=ACTIONS[action])
         state = self.state()
         if state.cause not in good:
-            raise MotionFailed(
-                state.cause,
-                CAUSE_CODES[state.cause],
-                f"node {self.node.address} did not {action} its values: {state.words}",
-            )
+            raise self._failed(state, action)
         return state
+
+    def _failed(self, state: SavedState, action: str) -> MotionFailed:
+        return MotionFailed(
+            state.cause,
+            CAUSE_CODES[state.cause],
+            f"node {self.node.address} did not {action} its values: {state.words}",
+        )

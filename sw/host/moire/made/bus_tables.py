@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0x6244CA52
+PROTOCOL_CRC = 0xDD208892
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -662,6 +662,12 @@ OPERATIONS = {operation.name: operation for operation in (
               "the end",
               (),
               ()),
+    Operation("saved_value", 55,
+              "one of the saved values, by its number from 0 on, as it is in the EEPROM; owner: "
+              "an axis, or 255 for a setting. Refused with eeprom_busy while it is being read: "
+              "ask again",
+              (("number", "u16"),),
+              (("owner", "u8"), ("id", "u8"), ("value", "i64"),)),
     Operation("save_settings", 58,
               "save parameters and settings to the EEPROM, or clear them; saved_settings reports "
               "the end",

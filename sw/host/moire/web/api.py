@@ -23,6 +23,7 @@ from moire.client.axis import REACT_S, Axis
 from moire.client.groups import group_of
 from moire.client.job import ACTIONS, Job
 from moire.client.names import CAUSE_CODES, descriptions
+from moire.client.nonvolatile import SavedSettings
 from moire.client.parameters import TRAVEL
 from moire.client.records import Identity, Status
 from moire.client.segments import Segments, SegmentTable
@@ -541,6 +542,20 @@ async def parameter(call: Call) -> Values:
     return values
 
 
+async def saved_parameters(call: Call) -> Values:
+    return {"saved": await call.command(saved_texts, "long")}
+
+
+def saved_texts(axis: Axis) -> dict[str, str]:
+    """The parameters after the next power-up as they are written, by name."""
+    counts = SavedSettings(axis.node).parameters(axis.number)
+    period_nm = Fraction(counts["period"], 1000)
+    return {
+        name: axis.parameter_value(name, count, period_nm).written()
+        for name, count in counts.items()
+    }
+
+
 async def set_parameter(call: Call) -> Values:
     values: Values = await call.command(
         lambda axis: parameter_values(
@@ -993,6 +1008,13 @@ OPERATIONS = (
         given=tuple(
             Given(known.name, "value", known.text, known.name) for known in PARAMETERS.values()
         ),
+    ),
+    Operation(
+        "GET",
+        f"{AXIS}/saved",
+        "What the parameters of an axis will be after the next power-up: what the node has saved.",
+        saved_parameters,
+        {"saved": ("map of texts", "exact values by name, written as `written` of a parameter is")},
     ),
     Operation("GET", f"{AXIS}/parameters/{{name}}", "One parameter.", parameter, PARAMETER),
     Operation(

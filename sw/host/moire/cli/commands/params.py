@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from moire.cli.files import read_json, write_text
-from moire.cli.parser import Group, moire
+from moire.cli.parser import Group, UsageError, moire
 from moire.cli.session import Call
 from moire.cli.tables import add_value_commands
 from moire.cli.values import FILE
@@ -98,14 +98,21 @@ def load(call: Call, file: str) -> None:
 
 @group.command(
     "diff",
-    help="Show the parameters that differ from their defaults, or from those in a file.",
-    example="moire --port /dev/ttyUSB0 params diff stage.toml",
+    help="Show the parameters that differ from their defaults, from those in a file, or from what "
+    "they will be after the next power-up of the node.",
+    example="moire --port /dev/ttyUSB0 params diff stage.toml -- params diff --saved",
 )
 @click.argument("file", type=FILE, metavar="FILE", required=False, help="A file of 'params save'.")
-def diff(call: Call, file: str | None) -> None:
+@click.option("--saved", is_flag=True, help="Compare with what the node has saved.")
+def diff(call: Call, file: str | None, saved: bool) -> None:
     """Changes nothing."""
     axis = call.axis
-    if file is None:
+    if saved and file is not None:
+        raise UsageError("a file and --saved exclude each other: write one of them")
+    if saved:
+        other, name = "saved", "saved"
+        found = differing(axis, SavedSettings(axis.node).parameters(axis.number))
+    elif file is None:
         other, name = "default", "default"
         found = [
             (value, value.default_written)
@@ -114,9 +121,11 @@ def diff(call: Call, file: str | None) -> None:
         ]
     else:
         other, name = "file", file
-        found = differing(axis, read_parameters(file)[0])
+        found = differing(axis, axis.check_parameters(read_parameters(file)[0]))
     rows = [f"{value.name:<20}{value.written():<24}{name}: {there}" for value, there in found]
-    same = f"{call.where}: all parameters " + ("have their defaults" if file is None else "agree")
+    same = f"{call.where}: all parameters " + (
+        "have their defaults" if other == "default" else "agree"
+    )
     call.say_of_axis(
         {
             "differences": [
@@ -186,15 +195,14 @@ def read_parameters(file: str) -> tuple[Mapping[str, str], list[int]]:
     )
 
 
-def differing(axis: Axis, texts: Mapping[str, str]) -> list[tuple[ParameterValue, str]]:
-    """The parameters of an axis that differ from these texts, and the values in the texts."""
-    counts = axis.check_parameters(texts)
+def differing(axis: Axis, counts: Mapping[str, int]) -> list[tuple[ParameterValue, str]]:
+    """The parameters of an axis that differ from these counts, and how those are written."""
     period_nm = axis.period_nm
     if "period" in counts:
         period_nm = Fraction(counts["period"], 1000)
-    here = {name: axis.get_parameter(name) for name in texts}
+    here = {name: axis.get_parameter(name) for name in counts}
     return [
-        (here[name], axis.parameter_value(name, counts[name], period_nm).written())
-        for name in texts
-        if here[name].counts != counts[name]
+        (here[name], axis.parameter_value(name, there, period_nm).written())
+        for name, there in counts.items()
+        if here[name].counts != there
     ]

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parameters of an axis by group: value with unit, limits, default, search, what differs from
-// the default or from the machine file.
+// the default, from the machine file, or from what the node has saved.
 
 import { sentence } from "./format.js";
 import { pathOf } from "./link.js";
 
 export class ParameterTable {
   constructor(section, link) {
-    Object.assign(this, { section, link, mayChange: false, rows: [] });
+    Object.assign(this, { section, link, mayChange: false, rows: [], saved: null });
     section.innerHTML = `
       <div class="bar">
         <h2 id="parameters-title">Parameters</h2>
@@ -18,6 +18,7 @@ export class ParameterTable {
           <option value="all">all</option>
           <option value="default">what differs from the default</option>
           <option value="described">what differs from machine.toml</option>
+          <option value="saved">what differs from saved values</option>
         </select></label>
       </div>
       <p class="message" role="status"></p>
@@ -30,7 +31,7 @@ export class ParameterTable {
     section.querySelector("button").onclick = () => this.read();
     this.axis.onchange = () => this.clear();
     this.search.oninput = () => this.filter();
-    this.shown.onchange = () => this.filter();
+    this.shown.onchange = () => this.choose();
   }
 
   open(names, mayChange) {
@@ -45,6 +46,7 @@ export class ParameterTable {
 
   clear() {
     this.rows = [];
+    this.saved = null; // what the node has saved, by name; null: not asked for
     this.table.replaceChildren();
     this.say("");
   }
@@ -60,9 +62,30 @@ export class ParameterTable {
     try {
       const { parameters } = await this.link.request("GET", `${pathOf(this.axis.value)}/parameters`);
       this.build(this.axis.value, parameters);
+      await this.choose();
     } catch (error) {
       this.say(sentence(error), true);
     }
+  }
+
+  /** Shows what is chosen; what the node has saved is read only where it is wanted. */
+  async choose() {
+    const { rows } = this;
+    if (this.shown.value === "saved" && rows.length && this.saved === null) {
+      this.say("reading what the node has saved");
+      try {
+        const { saved } = await this.link.request("GET", `${pathOf(this.axis.value)}/saved`);
+        if (rows !== this.rows) return; // of another axis
+        this.saved = saved;
+        for (const row of rows) this.show(row, row.known);
+      } catch (error) {
+        this.shown.value = "all";
+        this.filter();
+        this.say(sentence(error), true);
+        return;
+      }
+    }
+    this.filter();
   }
 
   build(axis, parameters) {
@@ -90,9 +113,7 @@ export class ParameterTable {
     name.scope = "row";
     name.textContent = known.name;
     row.append(name, ...[0, 1, 2, 3].map(() => document.createElement("td")));
-    const [value, preset, limits, text] = row.querySelectorAll("td");
-    preset.textContent = known.default_written;
-    if (known.described !== null) preset.textContent += `; machine.toml: ${known.described}`;
+    const [value, , limits, text] = row.querySelectorAll("td");
     limits.textContent = known.allowed;
     text.textContent = known.text;
     if (this.mayChange) {
@@ -116,6 +137,11 @@ export class ParameterTable {
   show(row, known) {
     row.known = known;
     row.classList.toggle("changed", known.value !== known.default);
+    const saved = this.saved?.[known.name];
+    row.cells[2].textContent =
+      known.default_written +
+      (known.described === null ? "" : `; machine.toml: ${known.described}`) +
+      (saved === undefined ? "" : `; saved: ${saved}`);
     const input = row.querySelector("input");
     if (input) input.value = known.written;
     else row.cells[1].textContent = known.written;
@@ -141,6 +167,7 @@ export class ParameterTable {
         all: true,
         default: row.known.value !== row.known.default,
         described: row.known.as_described === false,
+        saved: this.saved !== null && row.known.written !== this.saved[row.known.name],
       };
       row.hidden = !fits || !differs[this.shown.value];
       shown += !row.hidden;
