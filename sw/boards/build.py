@@ -14,6 +14,7 @@ python -m boards.build --board x --machine y [--only-files | --firmware]
 import argparse
 import hashlib
 import json
+import re
 import shutil
 import sys
 from collections import Counter
@@ -218,14 +219,37 @@ def cells(netlist: Path) -> str:
 
 def state(design: Design) -> str:
     """A hash of all that the placement depends on, except its seed."""
-    sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", Path(__file__)]
-    sources += [Path(__file__).with_name(name) for name in ("family.py", "gowin.lock")]
-    found = hashlib.sha256()
-    for path in sources:
+    found = hashlib.sha256(tools_state(design).encode())
+    for path in sorted((ROOT / "rtl").rglob("*.sv")):
         found.update(path.name.encode() + path.read_bytes())
     for name, text in files(design).items():
         found.update(name.encode() + text.encode())
     return found.hexdigest()
+
+
+def tools_state(design: Design) -> str:
+    """A hash of the tools, of what they are told, and of the pins."""
+    here = Path(__file__)
+    sources = [ROOT / "requirements.lock", here]
+    sources += [here.with_name(name) for name in ("family.py", "gowin.lock")]
+    found = hashlib.sha256(repr((design.name, design.board.node_hz)).encode())
+    for path in sources:
+        found.update(path.name.encode() + path.read_bytes())
+    found.update(files(design)[design.board.part.family.constraints].encode())
+    return found.hexdigest()
+
+
+def netlist_state(design: Design, netlist: Path) -> str:
+    """A hash of all that nextpnr sees, except its seed: a change of the RTL that leaves the netlist
+    as it was leaves this hash as it was. The places of lines are left out, and the names that Yosys
+    gives are numbered by their first appearance, since they have numbers of lines in them.
+    """
+    text = re.sub(r'"(?:\w+_)?src": "[^"]*",?', "", netlist.read_text())
+    numbers: dict[str, int] = {}
+    text = re.sub(
+        r'"(\$[^"]*)"', lambda name: f'"${numbers.setdefault(name[1], len(numbers))}"', text
+    )
+    return hashlib.sha256((tools_state(design) + text).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

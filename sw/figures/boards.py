@@ -27,19 +27,27 @@ def generated(design: Design, _seed: int) -> str:
     return f"{missing[0]} is missing" if missing else ""
 
 
-def once(design: Design, seed: int, measure: Callable[[], float]) -> float:
+def netlist_state(design: Design, synthesise: Callable[[], Path]) -> str:
+    """What nextpnr sees of a design; it is synthesised only if its sources have changed."""
+    file = RESULTS / f"{design.name}-{build.state(design)[:16]}.netlist"
+    if not file.is_file():
+        RESULTS.mkdir(parents=True, exist_ok=True)
+        file.write_text(build.netlist_state(design, synthesise()))
+    return file.read_text()
+
+
+def once(design: Design, seed: int, state: str, measure: Callable[[], float]) -> float:
     """What is measured of a design with a seed, or what it was before if nothing has changed that
-    the placement depends on; so the hours of the figure may be divided into sittings. A tool that
-    failed is a result, too.
+    nextpnr sees; so the hours of the figure may be divided into sittings. A tool that failed is a
+    result, too.
     """
-    file = RESULTS / f"{design.name}-seed{seed}-{build.state(design)[:16]}.json"
+    file = RESULTS / f"{design.name}-seed{seed}-{state[:16]}.json"
     if not file.is_file():
         found: dict[str, float | str] = {}
         try:
             found["mhz"] = measure()
         except SynthesisError as why:
             found["why"] = str(why)
-        RESULTS.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(found))
     known = json.loads(file.read_text())
     if "why" in known:
@@ -69,7 +77,8 @@ def built(design: Design, seed: int) -> str:
         netlist()
         return ""
     needed = design.board.node_hz / 1e6
-    tries = [once(design, one, partial(placed, one)) for one in seeds(seed, PLACEMENTS)]
+    state = netlist_state(design, lambda: netlist()[1])
+    tries = [once(design, one, state, partial(placed, one)) for one in seeds(seed, PLACEMENTS)]
     console.print(f"{design.name}: {', '.join(f'{mhz:.1f}' for mhz in tries)} MHz")
     return f"{min(tries):.1f} MHz, {needed:g} are needed" if min(tries) < needed else ""
 
