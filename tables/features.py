@@ -4,6 +4,7 @@ sw/boards/size.py, the sizes by which a node is estimated before its synthesis.
 """
 
 import sys
+from pathlib import Path
 
 from boards import size
 from tables import made_files
@@ -37,7 +38,7 @@ def rows() -> dict[str, int]:
     }
 
 
-def make() -> dict[made_files.Path, str]:
+def make() -> dict[Path, str]:
     table = ["| | LUT4 |", "| --- | --- |"]
     table += [f"| {words} | {lut} |" for words, lut in rows().items()]
     return {PAGE: made_files.filled(PAGE, BEGIN, END, ["", *table, ""])}
