@@ -219,24 +219,31 @@ def cells(netlist: Path) -> str:
 
 def state(design: Design) -> str:
     """A hash of all that the placement depends on, except its seed."""
-    found = hashlib.sha256(tools_state(design).encode())
-    for path in sorted((ROOT / "rtl").rglob("*.sv")):
+    here = Path(__file__)
+    sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", here]
+    sources += [here.with_name(name) for name in ("family.py", "gowin.lock")]
+    found = hashlib.sha256()
+    for path in sources:
         found.update(path.name.encode() + path.read_bytes())
     for name, text in files(design).items():
         found.update(name.encode() + text.encode())
     return found.hexdigest()
 
 
-def tools_state(design: Design) -> str:
-    """A hash of the tools, of what they are told, and of the pins."""
-    here = Path(__file__)
-    sources = [ROOT / "requirements.lock", here]
-    sources += [here.with_name(name) for name in ("family.py", "gowin.lock")]
-    found = hashlib.sha256(repr((design.name, design.board.node_hz)).encode())
-    for path in sources:
-        found.update(path.name.encode() + path.read_bytes())
-    found.update(files(design)[design.board.part.family.constraints].encode())
-    return found.hexdigest()
+def told(design: Design) -> str:
+    """What nextpnr is told of a design beside its netlist and a seed, and its version."""
+    part, locks = (
+        design.board.part,
+        (ROOT / "requirements.lock", Path(__file__).with_name("gowin.lock")),
+    )
+    versions = [
+        line
+        for lock in locks
+        for line in lock.read_text().splitlines()
+        if "nextpnr" in line or "apycula" in line.lower()
+    ]
+    options = [*chip(design), *pinned(design, OUT), design.board.node_hz]
+    return repr((versions, options, files(design)[design.board.part.family.constraints]))
 
 
 def netlist_state(design: Design, netlist: Path) -> str:
@@ -249,7 +256,7 @@ def netlist_state(design: Design, netlist: Path) -> str:
     text = re.sub(
         r'"(\$[^"]*)"', lambda name: f'"${numbers.setdefault(name[1], len(numbers))}"', text
     )
-    return hashlib.sha256((tools_state(design) + text).encode()).hexdigest()
+    return hashlib.sha256((told(design) + text).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

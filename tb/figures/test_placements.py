@@ -32,7 +32,7 @@ def test_a_netlist_is_another_if_a_cell_is_but_not_if_lines_or_numbers_are(desig
 
 def test_another_pin_or_board_is_another_placement(design):
     other = fit(board.named("colorlight_i9"), machine.named("mill"))
-    assert build.tools_state(other) != build.tools_state(design)
+    assert build.told(other) != build.told(design)
 
 
 def test_a_design_is_synthesised_again_only_if_its_sources_have_changed(
