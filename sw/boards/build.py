@@ -232,10 +232,7 @@ def state(design: Design) -> str:
 
 def told(design: Design) -> str:
     """What nextpnr is told of a design beside its netlist and a seed, and its version."""
-    part, locks = (
-        design.board.part,
-        (ROOT / "requirements.lock", Path(__file__).with_name("gowin.lock")),
-    )
+    locks = (ROOT / "requirements.lock", Path(__file__).with_name("gowin.lock"))
     versions = [
         line
         for lock in locks
