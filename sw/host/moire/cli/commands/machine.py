@@ -69,7 +69,7 @@ def check(call: Call) -> None:
     found = [
         (one.name, value, there)
         for one, axis in described(call)
-        for value, there in differing(axis, one.parameters)
+        for value, there in differing(axis, axis.check_parameters(one.parameters))
     ]
     rows = [
         f"{name:<12}{value.name:<20}{value.written():<20}described: {there}"
