@@ -14,6 +14,7 @@ from twin.compiled.station import SETTING, Station
 
 COPIES = (8192, 12288)
 VALUE = 16  # bytes
+CHANGED = {"kp": 0, "travel_low": -5}  # parameters, in tests that save some
 END = 0x101
 
 
@@ -87,6 +88,34 @@ def test_parameters_and_settings_are_in_force_after_a_power_cut_and_all_others_a
         "generation": 1,
         "values": 6,
     }
+
+
+def saved_value(station, number):
+    """One of the saved values: (owner, id, value), or the cause of a refusal."""
+    while (answer := station.request("saved_value", number=number))[0] == "eeprom_busy":
+        station.run(1)
+    cause, reply = answer
+    return tuple(reply[name] for name in ("owner", "id", "value")) if cause == "ok" else cause
+
+
+def test_saved_values_are_read_back_one_by_one_and_never_older_than_the_last_save():
+    station = powered()
+    assert saved_value(station, 0) == "out_of_range"
+    station.set(**CHANGED)
+    station.setting(turn_frames=9)
+    assert station.save_settings() == "ok"
+    before = station.saved_settings()
+    expected = sorted((0, PARAMETER[name]["id"], value) for name, value in CHANGED.items())
+    expected.append((255, SETTING["turn_frames"], 9))
+    assert [saved_value(station, n) for n in range(3)] == expected
+    assert saved_value(station, 3) == "out_of_range"
+    assert station.saved_settings() == before
+    station.setting(turn_frames=8)
+    assert saved_value(station, 2) == (255, SETTING["turn_frames"], 9)
+    station.save_settings()
+    assert saved_value(station, 2) == (255, SETTING["turn_frames"], 8)
+    station.bus.devices.pop(0x50)
+    assert saved_value(station, 1) == "eeprom_missing"
 
 
 def test_a_sub_node_listens_to_its_main_node_only_when_its_axis_is_as_it_was():
