@@ -26,4 +26,5 @@ constexpr uint32_t REPLY_FRAME_WORDS = 7;
 constexpr uint32_t LONGEST_WORDS = 128;
 constexpr uint32_t MOST_VALUES = 121;
 constexpr uint32_t UDP_PORT = 27181;
+constexpr uint32_t SPI_TURNROUND_US = 25;
 }  // namespace link_packet

@@ -294,7 +294,7 @@ def over_ethernet(folder, address="192.168.1.50", more=""):
 
 def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(tmp_path):
     design = fit(board.named("colorlight_i5"), machine.load(over_ethernet(tmp_path)))
-    assert (design.parameters["HAS_LINK"], design.parameters["LINK_UDP"]) == (1, 1)
+    assert (design.parameters["HAS_LINK"], design.parameters["LINK_CARRIER"]) == (1, 1)
     made = generate.files(design)
     assert f".mac_address(48'd{0x024D_C0A8_0132})," in made["top.sv"]
     assert f".ip_address(32'd{0xC0A8_0132}),  // 192.168.1.50" in made["top.sv"]
