@@ -57,7 +57,8 @@ def constants(table: Table) -> dict[str, int]:
     frame = max(found["FRAME_WORDS"], found["REPLY_FRAME_WORDS"])
     found["MOST_VALUES"] = table["longest"] - frame
     found["UDP_PORT"] = table["udp_port"]
-    found["SPI_TURNROUND_US"] = table["spi_turnround_us"]
+    found["SPI_TURNROUND_NS"] = table["spi_turnround_ns"]
+    found["SPI_TURNROUND_BYTE_NS"] = table["spi_turnround_byte_ns"]
     return found
 
 

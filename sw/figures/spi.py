@@ -13,14 +13,14 @@ SCLK_CYCLES, HIGH_CYCLES = 5, 2  # of the clock of the SPI, the shortest period
 SCLK_HZ = CLK_HZ // SCLK_CYCLES
 GAP_CYCLES = 2  # before the clock and after it, and between two transfers
 TICK_HZ = 4000
-NODE = {"HAS_SINE": 0, "FILTERS": 0, "HAS_BRIDGE": 0, "HAS_DAC": 0, "MEMORY_BYTES": 4096}
+NODE = {"HAS_SET_POINTS": 255, "HAS_SINE": 0, "FILTERS": 0, "HAS_BRIDGE": 0, "HAS_DAC": 0, "MEMORY_BYTES": 4096}
 LINK = {"HAS_LINK": 1, "LINK_CARRIER": 2, "FIRMWARE": '""'}
 HIGH = ("rs485_rx", "link_rx", "link_cs_n", "i2c_scl", "i2c_sda", "peer_rx", "sensor_rx")
 HIGH += ("keyboard_clock", "keyboard_data", "edm_clock", "edm_data")
 
 
 class SpiNode(NodeBench):
-    """The node, after its reset. Its link has no set-points."""
+    """The node, after its reset."""
 
     def __init__(self, axes: int = 1) -> None:
         parameters = {"AXES": axes, "CLK_HZ": CLK_HZ, "TICK_HZ": TICK_HZ, **NODE, **LINK}

@@ -24,6 +24,7 @@ ROTARY = "ABC"
 LEAST_DELAY_MS = 4.0  # a set-point is sent when the next one is known, 8 servo ticks ahead
 MARGIN = 2.0  # of the following error that LinuxCNC sees, over the one of the delay
 SERVO_MS = 1.0
+CARRIERS = {"udp": "udp:HOST:PORT", "serial": "serial:DEVICE:BAUD", "spi": "spi:DEVICE:HZ"}
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Configuration:
     title: str
     address: int  # on the bus
     bus: str  # port of the bus, for the set-up; empty: another program sets the link up
-    node: str  # real-time link, serial:DEVICE:BAUD or udp:HOST:PORT
+    node: str  # real-time link, in one of the forms of CARRIERS
     delay_ms: float  # of a set-point
     period_ns: int
     axes: list[Joint]
@@ -157,8 +158,8 @@ def load(name: str) -> Configuration:
         raise file.misfit("no axis has a drive: LinuxCNC has nothing to move")
     table = file.table("linuxcnc", True)
     bus, node = table.take("bus", str), table.take("node", str)
-    if len(node.split(":")) < 3 or node.split(":")[0] not in ("udp", "serial"):
-        raise table.misfit(f"node {node!r}: write udp:HOST:PORT or serial:DEVICE:BAUD")
+    if len(node.split(":")) < 3 or node.split(":")[0] not in CARRIERS:
+        raise table.misfit(f"node {node!r}: write {', '.join(CARRIERS.values())}")
     delay = table.take("delay_ms", float, 5.0)
     if delay < LEAST_DELAY_MS:
         raise table.misfit(f"delay_ms {delay:g}: a set-point needs {LEAST_DELAY_MS:g} at least")

@@ -22,12 +22,15 @@ from moire.made import link_tables as layout
 WRITE_MODE, WRITE_BITS, MESSAGE = 0x40016B01, 0x40016B03, 0x40206B00
 TRANSFER = struct.Struct("=QQIIHBBBBBB")
 MODE, BITS = 0, 8
-MOST_HZ = 100_000_000
+LEAST_HZ, MOST_HZ = 1000, 50_000_000
 
 
-def turnround_bytes(hz: int) -> int:
-    """Bytes between request and reply, for which the node plays the request."""
-    return -(-hz * layout.SPI_TURNROUND_US // 8_000_000)
+def turnround_bytes(packets: int, hz: int) -> int:
+    """Bytes between request and reply, for which the node plays the request: for so many bytes of
+    both.
+    """
+    duration_ns = layout.SPI_TURNROUND_NS + layout.SPI_TURNROUND_BYTE_NS * packets
+    return -(-hz * duration_ns // 8_000_000_000)
 
 
 def reply_bytes(link: Link) -> int:
@@ -37,7 +40,8 @@ def reply_bytes(link: Link) -> int:
 
 def transfer_of(link: Link, request: bytes, hz: int) -> bytes:
     """The bytes that the host sends in a transfer: a request, and zeros while the reply comes."""
-    return request + bytes(turnround_bytes(hz) + reply_bytes(link))
+    reply = reply_bytes(link)
+    return request + bytes(turnround_bytes(len(request) + reply, hz) + reply)
 
 
 def reply_in(received: bytes, link: Link) -> bytes:
@@ -51,8 +55,8 @@ class SpiDevice:
     """An SPI device of Linux. PortError says why it cannot be used."""
 
     def __init__(self, device: str, hz: int) -> None:
-        if not 0 < hz <= MOST_HZ:
-            raise OutOfRange(f"the SPI clock is {hz} Hz: choose from 1 to {MOST_HZ}")
+        if not LEAST_HZ <= hz <= MOST_HZ:
+            raise OutOfRange(f"the SPI clock is {hz} Hz: choose from {LEAST_HZ} to {MOST_HZ}")
         self.device, self.hz = device, hz
         try:
             self.file = os.open(device, os.O_RDWR | os.O_CLOEXEC)
