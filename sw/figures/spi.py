@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulated node with its real-time link over SPI, and a host at its pins.
 
-    node = SpiNode(axes=2)
-    received = node.transfer(sent)
+node = SpiNode(axes=2)
+received = node.transfer(sent)
 """
 
 from figures.node_bench import NodeBench
@@ -13,8 +13,8 @@ SCLK_CYCLES, HIGH_CYCLES = 5, 2  # of the clock of the SPI, the shortest period
 SCLK_HZ = CLK_HZ // SCLK_CYCLES
 GAP_CYCLES = 2  # before the clock and after it, and between two transfers
 TICK_HZ = 4000
-NODE = {"HAS_SET_POINTS": 255, "HAS_SINE": 0, "FILTERS": 0, "HAS_BRIDGE": 0, "HAS_DAC": 0, "MEMORY_BYTES": 4096}
-LINK = {"HAS_LINK": 1, "LINK_CARRIER": 2, "FIRMWARE": '""'}
+NODE = {"HAS_SET_POINTS": 255, "HAS_SINE": 0, "FILTERS": 0, "HAS_BRIDGE": 0, "HAS_DAC": 0}
+LINK = {"HAS_LINK": 1, "LINK_CARRIER": 2, "MEMORY_BYTES": 4096, "FIRMWARE": '""'}
 HIGH = ("rs485_rx", "link_rx", "link_cs_n", "i2c_scl", "i2c_sda", "peer_rx", "sensor_rx")
 HIGH += ("keyboard_clock", "keyboard_data", "edm_clock", "edm_data")
 

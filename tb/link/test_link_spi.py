@@ -244,7 +244,8 @@ async def any_traffic_matches_the_model(dut):
         follower.playing, follower.accepts = random.randrange(100), random.randrange(4) > 0
         rate = dict(high=random.choice([1, 1, 2, 3]), low=random.choice([1, 2]))
         sent = request_of() + random.randbytes(random.randrange(20))
-        await follower.transfer(sent, random.choice([None, random.randrange(8 * len(sent))]), **rate)
+        bits = random.choice([None, random.randrange(8 * len(sent))])
+        await follower.transfer(sent, bits, **rate)
         for _ in range(random.randrange(10)):
             await follower.clk(sclk=random.getrandbits(1), rst=int(random.randrange(20) == 0))
     for _ in range(4000):

@@ -8,7 +8,7 @@ from unittest.mock import Mock
 import pytest
 
 from linuxcnc_config.__main__ import main
-from linuxcnc_config.generate import Misfit, load, texts
+from linuxcnc_config.generate import CARRIERS, Misfit, load, texts
 from linuxcnc_config.lists import READS, WRITES
 from linuxcnc_config.set_up import Backlash, Unfit, set_up
 from linuxcnc_config.set_up import main as set_up_program
@@ -126,7 +126,7 @@ def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(
         (("period_um = 4\n", ""), "period_um is missing"),
         (("velocity = 50", "velocity = 50\nspeed = 2"), "there is no key speed"),
         (('name = "X"', 'name = "left"'), "name 'left': LinuxCNC knows the axes X, Y, Z"),
-        (("serial:/dev/ttyUSB1:3000000", "ttyUSB1"), "write udp:HOST:PORT, serial:DEVICE:BAUD, spi:DEVICE:HZ"),
+        (("serial:/dev/ttyUSB1:3000000", "ttyUSB1"), f"write {', '.join(CARRIERS.values())}"),
         (('node = "serial', 'delay_ms = 2\nnode = "serial'), "delay_ms 2: a set-point needs 4"),
         (
             ("velocity = 50", "velocity = 50\nbacklash_um = 5"),

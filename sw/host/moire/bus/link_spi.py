@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Self
 
 from moire.bus.link import Link
-from moire.errors import PortError, OutOfRange
+from moire.errors import OutOfRange, PortError
 from moire.made import link_tables as layout
 
 # linux/spi/spidev.h: the requests of ioctl, and struct spi_ioc_transfer
