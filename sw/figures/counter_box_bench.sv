@@ -119,8 +119,8 @@ module counter_box_bench #(
         1'b0, adc_cs_n, adc_sclk, compare_pulse, bridge_a, bridge_b, step, direction, dac_cs_n,
         dac_sclk, dac_sdi, drive_enable, i2c_scl_low, i2c_sda_low, keyboard_clock_low,
         keyboard_data_low, edm_clock_low, edm_data_low, peer_tx, display_cs_n, display_sclk,
-        display_data, link_tx, link_driver_enable, link_miso, udp_rx_ready, udp_tx_valid, udp_tx_data,
-        udp_tx_last, udp_tx_receiver, udp_tx_length
+        display_data, link_tx, link_driver_enable, link_miso, udp_rx_ready, udp_tx_valid,
+        udp_tx_data, udp_tx_last, udp_tx_receiver, udp_tx_length
     };
 endmodule
 

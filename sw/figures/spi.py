@@ -14,9 +14,11 @@ SCLK_HZ = CLK_HZ // SCLK_CYCLES
 GAP_CYCLES = 2  # before the clock and after it, and between two transfers
 TICK_HZ = 4000
 NODE = {"HAS_SET_POINTS": 255, "HAS_SINE": 0, "FILTERS": 0, "HAS_BRIDGE": 0, "HAS_DAC": 0}
-LINK = {"HAS_LINK": 1, "LINK_CARRIER": 2, "MEMORY_BYTES": 4096, "FIRMWARE": '""'}
-HIGH = ("rs485_rx", "link_rx", "link_cs_n", "i2c_scl", "i2c_sda", "peer_rx", "sensor_rx")
-HIGH += ("keyboard_clock", "keyboard_data", "edm_clock", "edm_data")
+LINK = {"HAS_LINK": 1, "LINK_CARRIER": 2, "MEMORY_BYTES": 4096}
+HIGH = (
+    *("rs485_rx", "link_rx", "link_cs_n", "i2c_scl", "i2c_sda", "peer_rx", "sensor_rx"),
+    *("keyboard_clock", "keyboard_data", "edm_clock", "edm_data"),
+)
 
 
 class SpiNode(NodeBench):
