@@ -14,6 +14,7 @@ python -m boards.build --board x --machine y [--only-files | --firmware]
 import argparse
 import hashlib
 import json
+import re
 import shutil
 import sys
 from collections import Counter
@@ -218,14 +219,41 @@ def cells(netlist: Path) -> str:
 
 def state(design: Design) -> str:
     """A hash of all that the placement depends on, except its seed."""
-    sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", Path(__file__)]
-    sources += [Path(__file__).with_name(name) for name in ("family.py", "gowin.lock")]
+    here = Path(__file__)
+    sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", here]
+    sources += [here.with_name(name) for name in ("family.py", "gowin.lock")]
     found = hashlib.sha256()
     for path in sources:
         found.update(path.name.encode() + path.read_bytes())
     for name, text in files(design).items():
         found.update(name.encode() + text.encode())
     return found.hexdigest()
+
+
+def told(design: Design) -> str:
+    """What nextpnr is told of a design beside its netlist and a seed, and its version."""
+    locks = (ROOT / "requirements.lock", Path(__file__).with_name("gowin.lock"))
+    versions = [
+        line
+        for lock in locks
+        for line in lock.read_text().splitlines()
+        if "nextpnr" in line or "apycula" in line.lower()
+    ]
+    options = [*chip(design), *pinned(design, OUT), design.board.node_hz]
+    return repr((versions, options, files(design)[design.board.part.family.constraints]))
+
+
+def netlist_state(design: Design, netlist: Path) -> str:
+    """A hash of all that nextpnr sees, except its seed: a change of the RTL that leaves the netlist
+    as it was leaves this hash as it was. The places of lines are left out, and the names that Yosys
+    gives are numbered by their first appearance, since they have numbers of lines in them.
+    """
+    text = re.sub(r'"(?:\w+_)?src": "[^"]*",?', "", netlist.read_text())
+    numbers: dict[str, int] = {}
+    text = re.sub(
+        r'"(\$[^"]*)"', lambda name: f'"${numbers.setdefault(name[1], len(numbers))}"', text
+    )
+    return hashlib.sha256((told(design) + text).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine: what a machine file (constraints/machines/NAME.toml) says of its axes, of what is
-between them and the board, and of the pins that they are on.
+between them and the board, and of the pins that they are on. The host reads names, units and
+parameters of axes from the same file (moire.description).
 """
 
 import ipaddress
@@ -12,7 +13,9 @@ from typing import Any
 from boards import front_ends
 from boards.toml_file import ROOT, Misfit, Table, read, shown
 from firmware.build import IMAGES
+from moire import description
 from moire.bus.protocol import MOST_AXES
+from moire.errors import BadFile
 
 FOLDER = ROOT / "constraints" / "machines"
 
@@ -239,7 +242,8 @@ def axis_of(table: Table) -> Axis:
         table.chosen("features", FEATURES),
         table.chosen("unused", AXIS_SIGNALS),
     )
-    table.left.pop("linuxcnc", None)  # what linuxcnc_config reads
+    for name in ("linuxcnc", "unit", "parameters"):  # linuxcnc_config and the host read them
+        table.left.pop(name, None)
     table.close()
     if not axis.name.isidentifier():
         raise table.misfit(f"name {axis.name!r} must consist of letters, digits and _")
@@ -374,11 +378,21 @@ def names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
+def check_for_host(content: dict[str, Any], file: str) -> None:
+    """Refuses what the host would not understand in a file: port, units, parameters."""
+    try:
+        description.parse(content, file)
+    except BadFile as why:
+        raise Misfit(str(why)) from None
+
+
 def load(path: Path) -> Machine:
     """The machine of a machine file."""
     table = read(path)
+    content = dict(table.left)
     title, between = table.take("title", str), between_of(table.table("between"))
-    table.left.pop("linuxcnc", None)  # what linuxcnc_config reads
+    for name in ("linuxcnc", "port"):  # linuxcnc_config and the host read them
+        table.left.pop(name, None)
     layouts = table.table("wiring")
     if {"node", "relay"} <= set(table.left):
         raise table.misfit("a machine has [node] or [relay], not both")
@@ -415,6 +429,8 @@ def load(path: Path) -> Machine:
     for each in (kind, table):
         each.close()
     check(machine)
+    if not is_relay:
+        check_for_host(content, table.file)
     return machine
 
 

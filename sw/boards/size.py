@@ -8,7 +8,7 @@ from figures import record
 from firmware.build import stem_of
 
 MEASURED = {name: round(entry.value) for name, entry in record.read().items()}
-# LUT4 of an ECP5; what no figure measures is as docs/features.md lists it
+# LUT4 of an ECP5; what no figure measures was measured by synthesis
 STEP_AXIS, SINE_AXIS = MEASURED["axis_step_lut"], MEASURED["axis_sine_lut"]
 STEP_NODE, SINE_NODE = 8291, 10583  # of two axes each
 FEATURES = {

@@ -17,6 +17,7 @@ from boards.toml_file import Misfit
 from figures.common import Figure, Quick, console, seeds
 from figures.synthesis import PLACEMENTS, SynthesisError
 
+SMALL = ("counter_box", "relay")  # machines on an iCEBreaker
 RESULTS = build.OUT / "results"  # of placements that are done
 
 
@@ -27,19 +28,27 @@ def generated(design: Design, _seed: int) -> str:
     return f"{missing[0]} is missing" if missing else ""
 
 
-def once(design: Design, seed: int, measure: Callable[[], float]) -> float:
+def netlist_state(design: Design, synthesise: Callable[[], Path]) -> str:
+    """What nextpnr sees of a design; it is synthesised only if its sources have changed."""
+    file = RESULTS / f"{design.name}-{build.state(design)[:16]}.netlist"
+    if not file.is_file():
+        RESULTS.mkdir(parents=True, exist_ok=True)
+        file.write_text(build.netlist_state(design, synthesise()))
+    return file.read_text()
+
+
+def once(design: Design, seed: int, state: str, measure: Callable[[], float]) -> float:
     """What is measured of a design with a seed, or what it was before if nothing has changed that
-    the placement depends on; so the hours of the figure may be divided into sittings. A tool that
-    failed is a result, too.
+    nextpnr sees; so the hours of the figure may be divided into sittings. A tool that failed is a
+    result, too.
     """
-    file = RESULTS / f"{design.name}-seed{seed}-{build.state(design)[:16]}.json"
+    file = RESULTS / f"{design.name}-seed{seed}-{state[:16]}.json"
     if not file.is_file():
         found: dict[str, float | str] = {}
         try:
             found["mhz"] = measure()
         except SynthesisError as why:
             found["why"] = str(why)
-        RESULTS.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(found))
     known = json.loads(file.read_text())
     if "why" in known:
@@ -47,9 +56,9 @@ def once(design: Design, seed: int, measure: Callable[[], float]) -> float:
     return float(known["mhz"])
 
 
-def built(design: Design, seed: int) -> str:
-    """Why a design has no bitstream or misses its clock at one of the seeds; empty if it is good. A
-    part that no open tool places has a netlist.
+def clocks(design: Design, seed: int) -> list[float]:
+    """MHz at each of the seeds, with a bitstream made of each placement; empty for a part that no
+    open tool places, of which only the netlist is made.
     """
     build.check_tools(design)
 
@@ -67,11 +76,28 @@ def built(design: Design, seed: int) -> str:
 
     if design.board.part.family.placer is None:
         netlist()
-        return ""
-    needed = design.board.node_hz / 1e6
-    tries = [once(design, one, partial(placed, one)) for one in seeds(seed, PLACEMENTS)]
+        return []
+    state = netlist_state(design, lambda: netlist()[1])
+    tries = [once(design, one, state, partial(placed, one)) for one in seeds(seed, PLACEMENTS)]
     console.print(f"{design.name}: {', '.join(f'{mhz:.1f}' for mhz in tries)} MHz")
-    return f"{min(tries):.1f} MHz, {needed:g} are needed" if min(tries) < needed else ""
+    return tries
+
+
+def built(design: Design, seed: int) -> str:
+    """Why a design has no bitstream or misses its clock at one of the seeds; empty if it is good. A
+    part that no open tool places has a netlist.
+    """
+    needed = design.board.node_hz / 1e6
+    reached = min(clocks(design, seed), default=needed)
+    return f"{reached:.1f} MHz, {needed:g} are needed" if reached < needed else ""
+
+
+def board_small_mhz(places: bool = True, seed: int = 1) -> float:
+    """The slowest of the two small boxes; without a placement the clock that the board gives."""
+    designs = [fit(boards.named("icebreaker"), machines.named(name)) for name in SMALL]
+    if not places:
+        return min(design.board.node_hz / 1e6 for design in designs if not generated(design, seed))
+    return min(mhz for design in designs for mhz in clocks(design, seed))
 
 
 def boards_failed(places: bool = True, seed: int = 1) -> float:
@@ -131,6 +157,15 @@ def mill(measure: Callable[..., float], words: str, bound: str) -> Figure:
 FIGURES = {
     "board_mill_i5_pct": mill(board_mill_i5_pct, "a Colorlight i5 (LFE5U-25F)", "<= 50"),
     "board_mill_tang_pct": mill(board_mill_tang_pct, "a Tang Nano 20K (GW2AR-18)", "<= 70"),
+    "board_small_mhz": Figure(
+        board_small_mhz,
+        "MHz",
+        "highest clock of the counter box and of the relay on an iCEBreaker (iCE40 UP5K), as `make "
+        "board` builds them: the slower one, the worst of three placement seeds each",
+        ">= 24",
+        Quick({"places": False}, "their files are made; the clock that the board gives", ">= 18"),
+        1,
+    ),
     "boards_failed": Figure(
         boards_failed,
         "builds",

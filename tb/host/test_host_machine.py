@@ -4,10 +4,13 @@
 import asyncio
 import inspect
 import json
+import re
 
 import pytest
 
 import moire
+from boards import machine as build_machine
+from boards.toml_file import Misfit
 from experiments import machines, s0_stage
 from moire import aio, description
 from moire import machine as machine_module
@@ -74,6 +77,75 @@ def test_the_file_that_is_named_holds_before_the_variable_the_folder_and_the_set
             monkeypatch.setenv(description.VARIABLE, str(path))
         texts[name] = description.describe("named.toml" if name.startswith("named") else None).text
     assert all(name == text for name, text in texts.items())
+
+
+def test_the_file_of_a_board_names_the_axes_for_the_host():
+    found = description.describe(str(build_machine.FOLDER / "mill.toml"))
+    assert [one.place for one in found.axes.values()] == [(1, 0), (1, 1), (1, 2)]
+    assert list(found.axes) == ["X", "Y", "Z"] and found.text.startswith("S2 and three-axis mill")
+
+
+def test_every_node_of_the_project_is_a_machine_of_the_host():
+    for name in build_machine.names():
+        built, path = build_machine.named(name), str(build_machine.FOLDER / f"{name}.toml")
+        if built.orders:
+            with pytest.raises(BadFile, match="this is a relay"):
+                description.describe(path)
+            continue
+        found = description.describe(path).axes.values()
+        assert [one.name for one in found] == [axis.name for axis in built.axes]
+        assert {one.node for one in found} == {built.address}
+
+
+def both(folder, more, axis=""):
+    """The file of a mill with more at its begin and in its first axis, read by host and build."""
+    text = (build_machine.FOLDER / "mill.toml").read_text()
+    path = folder / "own_mill.toml"
+    path.write_text(more + text.replace('name = "X"', f'name = "X"\n{axis}', 1))
+    return description.describe(str(path)), build_machine.load(path)
+
+
+def test_one_file_serves_the_board_and_the_host(folder):
+    found, built = both(
+        folder,
+        'port = "/dev/ttyTest"\n',
+        'unit = "um"\nparameters = { velocity = "3mm/s", travel_high = "40 mm" }',
+    )
+    assert found.port == "/dev/ttyTest" and found.axes["X"].unit == "um"
+    assert found.axes["X"].parameters == {"velocity": "3mm/s", "travel_high": "40 mm"}
+    assert [axis.name for axis in built.axes] == list(found.axes)
+
+
+@pytest.mark.parametrize(
+    "more, axis, why",
+    [
+        ("port = 3\n", "", "port is no text"),
+        ("", 'unit = "inch"', "axes.X.unit = 'inch': allowed are mm, um, nm"),
+        ("", "parameters = { speed = 3 }", "there is no 'axes.X.parameters.speed'"),
+        ("", 'parameters = "fast"', "axes.X.parameters is no table"),
+    ],
+)
+def test_host_and_build_refuse_the_same_mistake(folder, more, axis, why):
+    with pytest.raises(BadFile, match=re.escape(why)):
+        both(folder, more, axis)
+    with pytest.raises(Misfit, match=re.escape(why)):
+        build_machine.load(folder / "own_mill.toml")
+
+
+@pytest.mark.parametrize(
+    "text, why",
+    [
+        ("[node]\n", "a node has the tables [node] and [[axis]]"),
+        ("[node]\n[[axis]]\n", "axis 0 has no name"),
+        ('[node]\n[[axis]]\nname = "X"\n[[axis]]\nname = "X"\n', "two axes have the name X"),
+        ('[node]\naddress = 99\n[[axis]]\nname = "X"\n', "node = 99 is no number"),
+        ('[node]\n[[axis]]\nname = "X"\n[axes.x]\n', "use [axes.NAME] or [[axis]], not both"),
+    ],
+)
+def test_a_file_of_a_board_that_the_host_cannot_use_is_refused(folder, text, why):
+    (folder / "machine.toml").write_text(text)
+    with pytest.raises(BadFile, match=re.escape(why)):
+        description.describe()
 
 
 def test_a_description_has_the_port_and_the_axes(file):

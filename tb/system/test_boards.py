@@ -543,26 +543,8 @@ def test_the_pll_of_an_ice40_is_at_its_pad_where_the_clock_comes_in_there():
     assert "SB_PLL40_CORE #(" in of_hx8k and ".REFERENCECLK(clock)" in of_hx8k
 
 
-def test_the_costs_of_features_are_those_that_the_page_lists():
-    """docs/features.md has the measured values; where it gives a range, the estimate has its low
-    end.
-    """
-    page = (ROOT / "docs" / "features.md").read_text()
-    rows = dict(
-        re.findall(r"^\| ([\w ,./:-]+?)(?: of 255 segments)? \| (\d+)(?: to \d+)? \|$", page, re.M)
-    )
-    words = {"segments": "segment table", "monitor": "signal monitor", "fine_stage": "fine stage"}
-    words |= {"capture": "capture queue", "encoder_check": "check of the encoder"}
-    words |= {"backlash": "compensation of backlash"}
-    for name, lut in size.FEATURES.items():
-        assert int(rows[words.get(name, name)]) == lut, name
-    assert int(rows["step generator"]) == size.STEPPER
-    assert int(rows["real-time link"]) == size.LINK
-    assert int(rows["set-points of one axis"]) == size.SET_POINTS
-    assert int(rows["set-points of each further axis"]) == size.SET_POINTS_AXIS
+def test_the_size_of_the_peripherals_is_the_one_of_their_page():
     assert f"take {size.PERIPHERALS} LUT4" in (ROOT / "docs" / "peripherals.md").read_text()
-    assert str(size.STEP_NODE) in rows.values() and str(size.SINE_NODE) in rows.values()
-    assert str(size.STEP_AXIS) in rows.values() and str(size.SINE_AXIS) in rows.values()
 
 
 def test_the_block_rams_are_those_of_netlists(tmp_path):

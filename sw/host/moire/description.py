@@ -13,6 +13,19 @@ which its lengths are shown, its parameters and its wiring in words. All clients
     [axes.x.parameters]
     travel_high = "40 mm"
 
+A machine of one node may have a single file for `make board` and the host: each [[axis]] of the
+file of `make board` is an axis with this name, and may have `unit` and `parameters`.
+
+    port = "/dev/ttyUSB0"
+
+    [node]
+    address = 1
+
+    [[axis]]
+    name = "X"
+    unit = "um"
+    parameters = { travel_high = "40 mm" }
+
 The file is the one that is named, that of the variable MOIRE_MACHINE_FILE, machine.toml in the
 present folder, or machine.toml in the folder of the user's settings; the first that there is.
 """
@@ -37,6 +50,7 @@ NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,23}")
 PLACE = re.compile(r"([0-9]{1,2})\.([0-9]{1,3})")
 DECIMALS = {"mm": 6, "um": 3, "nm": 1}  # with which a length is shown in this unit
 LARGEST_AXIS = 255
+BUILT = ("title", "node", "axis", "between", "wiring", "linuxcnc")  # in a file of `make board`
 
 
 @dataclass(frozen=True)
@@ -137,6 +151,32 @@ def read_toml(file: Path | str) -> dict[str, Any]:
         raise BadFile(f"the file {file} is no TOML: {error}") from None
 
 
+def named_axes(content: Mapping[str, Any], file: str) -> dict[str, Any]:
+    """What the file of `make board` says to the host, in the form of a file for the host alone.
+    What else it says, sw/boards/machine.py checks. Raises BadFile.
+    """
+
+    def wrong(what: str) -> BadFile:
+        return BadFile(f"{file}: {what}")
+
+    if "relay" in content:
+        raise wrong("this is a relay: it has no axes that a host moves")
+    if "axes" in content:
+        raise wrong("use [axes.NAME] or [[axis]], not both")
+    node, rows, axes = content["node"], content.get("axis"), {}
+    if not isinstance(node, dict) or not isinstance(rows, list):
+        raise wrong("a node has the tables [node] and [[axis]]")
+    for number, row in enumerate(rows):
+        if not isinstance(row, dict) or not isinstance(name := row.get("name"), str):
+            raise wrong(f'axis {number} has no name: write [[axis]] and name = "X"')
+        if name in axes:
+            raise wrong(f"two axes have the name {name}")
+        known = {key: row[key] for key in ("unit", "parameters") if key in row}
+        axes[name] = {"node": node.get("address", 1), "axis": number, **known}
+    host = {key: value for key, value in content.items() if key not in BUILT}
+    return {**host, "text": content.get("title", ""), "axes": axes}
+
+
 def parse(content: Mapping[str, Any], file: str) -> Description:
     """The description in the content of a file; raises BadFile with the place of the mistake."""
 
@@ -160,6 +200,8 @@ def parse(content: Mapping[str, Any], file: str) -> Description:
             if name not in names:
                 raise wrong(f"there is no '{where}{name}': allowed are {', '.join(names)}")
 
+    if content.keys() & {"node", "relay"}:
+        content = named_axes(content, file)
     known(content, ("text", "port", "axes"), "")
     tables, axes = content.get("axes", {}), {}
     if not isinstance(tables, dict):
