@@ -67,12 +67,12 @@ module link_spi (
     logic   [6:0] held;  // bits of mosi
     logic   [7:0] shifted;  // bits that are sent
 
-    wire       rise = sclk && !sclk_q && !cs_n;
-    wire       whole = rise && bits == 3'd7;  // a byte
-    wire [9:0] length = {{1'b0, writes} + 8'(FRAME_WORDS), 2'b00};  // bytes of a request
-    wire       some = bits != '0 || bytes != '0;  // something of a request has come
-    wire       in_request = state == REQUEST;
-    wire       loads = whole && state == ANSWER;
+    wire          rise = sclk && !sclk_q && !cs_n;
+    wire          whole = rise && bits == 3'd7;  // a byte
+    wire    [9:0] length = {{1'b0, writes} + 8'(FRAME_WORDS), 2'b00};  // bytes of a request
+    wire          some = bits != '0 || bytes != '0;  // something of a request has come
+    wire          in_request = state == REQUEST;
+    wire          loads = whole && state == ANSWER;
 
     assign miso        = shifted[7];
     assign valid       = whole && in_request;
