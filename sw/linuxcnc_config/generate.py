@@ -184,7 +184,9 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
         take_up=take_up,
         hysteresis=hysteresis,
         sensor=sensor,
-        **values,
+        period_um=values["period_um"],
+        velocity=values["velocity"],
+        acceleration=values["acceleration"],
     )
 
 
