@@ -50,7 +50,7 @@ module node #(
     parameter int HAS_STATUS_INPUTS = 0,  // 1: build the status inputs
     parameter int SCOPE_WORDS = 0,  // words of the recorder of ticks; 0: none, and no excitation
     parameter int HAS_LINK = 0,  // 1: build the real-time link
-    parameter int LINK_UDP = 0,  // carrier of the link, 0: serial line, 1: UDP datagrams
+    parameter int LINK_CARRIER = 0,  // of the link, 0: serial line, 1: UDP datagrams, 2: SPI
     parameter int HAS_SERIAL_CORE = 0,  // 1: bit-serial soft core, with its firmware in a flash
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
     parameter FIRMWARE = "",  // file of its contents at power-up
@@ -71,6 +71,11 @@ module node #(
     input  wire               link_rx,              // pin, idles high
     output logic              link_tx,              // pin, idles high
     output logic              link_driver_enable,   // pin, 1: drive the line
+    // SPI of the real-time link, whose host has the clock
+    input  wire               link_cs_n,            // pin, low during a transfer
+    input  wire               link_sclk,            // pin, idles low
+    input  wire               link_mosi,            // pin, data of the host
+    output logic              link_miso,            // pin, data to the host
     // UDP datagrams of the real-time link, from and to an Ethernet core with the same clock
     input  wire               udp_rx_valid,         // level, synchronous to clk: a byte
     input  wire  [       7:0] udp_rx_data,          // byte, synchronous to clk
@@ -645,9 +650,9 @@ module node #(
     );
 
     link_port #(
-        .CLK_HZ(CLK_HZ),
-        .BUILT (HAS_LINK),
-        .UDP   (LINK_UDP)
+        .CLK_HZ (CLK_HZ),
+        .BUILT  (HAS_LINK),
+        .CARRIER(LINK_CARRIER)
     ) u_link (
         .clk,
         .rst,
@@ -673,6 +678,11 @@ module node #(
         .link_rx,
         .link_tx,
         .link_driver_enable,
+        // pins of the SPI
+        .link_cs_n,
+        .link_sclk,
+        .link_mosi,
+        .link_miso,
         // UDP datagrams
         .udp_rx_valid,
         .udp_rx_data,

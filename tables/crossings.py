@@ -29,6 +29,7 @@ WHOLE: dict[str, dict[str, int | str]] = {  # the designs, with all that has pin
         **dict.fromkeys(("HAS_I2C", "HAS_PS2", "HAS_PEER", "HAS_ANGLE_SENSOR"), 1),
         **dict.fromkeys(("HAS_DISPLAY", "HAS_STATUS_INPUTS", "HAS_SERIAL_CORE", "HAS_LINK"), 1),
     },
+    "node, SPI": {"HAS_LINK": 1, "LINK_CARRIER": 2},  # of which only what the first lacks is shown
     "relay": {},
 }
 BOX = ROOT / "sw" / "figures" / "counter_box_bench.sv"  # a top around a node, as those of boards
@@ -47,6 +48,9 @@ RATES: dict[str, float] = {
     "flash_sdi": EACH_CYCLE,
     "rs485_rx": 3e6,  # 3 Mbaud
     "link_rx": 12e6,  # 12 Mbaud
+    "link_sclk": 24e6,  # both edges of 12 MHz
+    "link_mosi": 12e6,
+    "link_cs_n": 2e4,  # both edges of 10 kHz
     "peer_rx": 1e6,
     "sensor_rx": 1e6,
     "i2c_": 8e5,  # 400 kHz
@@ -251,8 +255,8 @@ def wrong_pins(top: Path, cells: str, inside: Mapping[str, str]) -> Iterator[str
 
 
 def designs() -> dict[str, Path]:
-    """The designs with their sources."""
-    return {name: ROOT / "rtl" / f"{name}.sv" for name in WHOLE}
+    """The designs with their sources; the name of a design begins with its module."""
+    return {name: ROOT / "rtl" / f"{name.partition(',')[0]}.sv" for name in WHOLE}
 
 
 def tops() -> list[tuple[Path, str]]:
@@ -299,11 +303,16 @@ def generate() -> dict[Path, str | None]:
     plain = []
     for name, source in designs().items():
         comments = inputs_of(source)
-        chains += crossings_of(name, elaborated(source, WHOLE[name], FLAT), comments)
+        known = {(one.inputs, one.path) for one in chains}
+        chains += [
+            one
+            for one in crossings_of(name, elaborated(source, WHOLE[name], FLAT), comments)
+            if (one.inputs, one.path) not in known
+        ]
         plain += [
             [name, f"`{port}`", words]
             for port, words in comments.items()
-            if kind_of(words) != "asynchronous"
+            if kind_of(words) != "asynchronous" and name == source.stem
         ]
     inside = {port: words for one in designs().values() for port, words in inputs_of(one).items()}
     if wrong := [one for top, cells in tops() for one in wrong_pins(top, cells, inside)]:

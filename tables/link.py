@@ -17,6 +17,7 @@ SOURCE = ROOT / "tables" / "link.toml"
 RECEIVER = ROOT / "rtl" / "link" / "packet_receiver.sv"
 PLAYER = ROOT / "rtl" / "link" / "packet_player.sv"
 DATAGRAM = ROOT / "rtl" / "link" / "link_datagram.sv"
+SPI = ROOT / "rtl" / "link" / "link_spi.sv"
 HOST = ROOT / "sw" / "host" / "moire" / "made" / "link_tables.py"
 HEADER = ROOT / "sw" / "figures" / "link_packet.h"
 PAGE = ROOT / "docs" / "link.md"
@@ -56,6 +57,8 @@ def constants(table: Table) -> dict[str, int]:
     frame = max(found["FRAME_WORDS"], found["REPLY_FRAME_WORDS"])
     found["MOST_VALUES"] = table["longest"] - frame
     found["UDP_PORT"] = table["udp_port"]
+    found["SPI_TURNROUND_NS"] = table["spi_turnround_ns"]
+    found["SPI_TURNROUND_BYTE_NS"] = table["spi_turnround_byte_ns"]
     return found
 
 
@@ -146,6 +149,7 @@ def made() -> dict[Path, str]:
         RECEIVER: module(RECEIVER, found),
         PLAYER: module(PLAYER, found),
         DATAGRAM: module(DATAGRAM, found),
+        SPI: module(SPI, found),
         HOST: host(table, found),
         HEADER: header(found),
         PAGE: page(table, found),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // link_port -- the node's port to the real-time link: process_link behind a register block, with a
-// serial line of 8N1 bytes and packets in COBS frames, or with UDP datagrams.
+// serial line of 8N1 bytes and packets in COBS frames, with UDP datagrams, or with SPI transfers.
 //
 // latency   see the blocks
 // rate      see the blocks
@@ -13,9 +13,9 @@
 `default_nettype none
 
 module link_port #(
-    parameter int CLK_HZ = 60_000_000,  // Hz, clk frequency; a multiple of 1000
-    parameter int BUILT  = 1,           // 0: no logic, all outputs are idle
-    parameter int UDP    = 0            // 0: serial line, 1: UDP datagrams
+    parameter int CLK_HZ  = 60_000_000,  // Hz, clk frequency; a multiple of 1000
+    parameter int BUILT   = 1,           // 0: no logic, all outputs are idle
+    parameter int CARRIER = 0            // 0: serial line, 1: UDP datagrams, 2: SPI
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -41,6 +41,11 @@ module link_port #(
     input  wire         link_rx,             // pin, idles high
     output logic        link_tx,             // pin, idles high
     output logic        link_driver_enable,  // pin, 1: drive the line
+    // pins of the SPI
+    input  wire         link_cs_n,           // pin, low during a transfer
+    input  wire         link_sclk,           // pin, idles low
+    input  wire         link_mosi,           // pin, data of the host
+    output logic        link_miso,           // pin, data to the host
     // UDP datagrams
     input  wire         udp_rx_valid,        // level: a byte of a datagram
     input  wire  [ 7:0] udp_rx_data,         // byte
@@ -55,7 +60,10 @@ module link_port #(
     output logic [15:0] udp_tx_length,       // bytes of the datagram
     input  wire         udp_tx_ready         // level: with udp_tx_valid, the byte is taken
 );
-    if (BUILT == 0 || UDP == 0) begin : g_no_udp
+    if (CARRIER < 0 || CARRIER > 2) begin : g_check
+        CARRIER_MUST_BE_0_1_OR_2 u_error ();
+    end
+    if (BUILT == 0 || CARRIER != 1) begin : g_no_udp
         assign {udp_rx_ready, udp_tx_valid, udp_tx_data, udp_tx_last} = '0;
         assign {udp_tx_receiver, udp_tx_length} = '0;
 
@@ -64,7 +72,12 @@ module link_port #(
             udp_tx_ready
         };
     end
-    if (BUILT == 0 || UDP != 0) begin : g_no_line
+    if (BUILT == 0 || CARRIER != 2) begin : g_no_spi
+        assign link_miso = 1'b0;
+
+        wire unused = &{1'b0, link_cs_n, link_sclk, link_mosi};
+    end
+    if (BUILT == 0 || CARRIER != 0) begin : g_no_line
         assign {link_tx, link_driver_enable} = 2'b10;
 
         wire unused = &{1'b0, link_rx};
@@ -128,7 +141,7 @@ module link_port #(
             .wdata      (link_wdata),
             .rdata      (link_rdata)
         );
-        if (UDP == 0) begin : g_line
+        if (CARRIER == 0) begin : g_line
             wire rx_level, rx, tx_level, sends, sending, transmitting, tick;
             wire received, ninth, start_glitch, receiving;
             wire [7:0] received_byte, byte_to_send;
@@ -209,7 +222,8 @@ module link_port #(
             assign rx_foreign = 1'b0;
 
             wire unused = &{1'b0, ninth, start_glitch, receiving, transmitting, tick, accepted};
-        end else begin : g_udp
+        end
+        if (CARRIER == 1) begin : g_udp
             link_datagram u_datagram (
                 .clk,
                 .rst,
@@ -237,6 +251,45 @@ module link_port #(
             assign {udp_tx_valid, udp_tx_data, udp_tx_last} = {tx_valid, tx_data, tx_last};
             assign tx_taken = udp_tx_ready;
             assign framing_errors = 1'b0;
+
+            wire unused = &{1'b0, bit_time};
+        end
+        if (CARRIER == 2) begin : g_spi
+            wire cs_n, sclk, mosi;
+
+            synchroniser #(
+                .W    (3),
+                .RESET(4)
+            ) u_pins (
+                .clk,
+                .rst,
+                .d({link_cs_n, link_sclk, link_mosi}),
+                .q({cs_n, sclk, mosi})
+            );
+            link_spi u_spi (
+                .clk,
+                .rst,
+                .writes     (lists_writes),
+                // pins, synchronised
+                .cs_n,
+                .sclk,
+                .mosi,
+                .miso       (link_miso),
+                // requests
+                .valid      (rx_valid),
+                .data       (rx_data),
+                .ends       (rx_ends),
+                .broken     (rx_broken),
+                .accepted,
+                .cut        (framing_errors),
+                // replies
+                .reply_valid(tx_valid),
+                .reply_data (tx_data),
+                .reply_last (tx_last),
+                .reply_taken(tx_taken)
+            );
+
+            assign rx_foreign = 1'b0;
 
             wire unused = &{1'b0, bit_time};
         end

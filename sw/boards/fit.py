@@ -5,11 +5,21 @@ from dataclasses import dataclass, replace
 
 from boards import clocks, size
 from boards.board import FLASH, Board, Ethernet, Pad
-from boards.machine import DRIVES, FEATURES, PERIPHERALS, Between, Machine, Signal, Wiring
+from boards.machine import (
+    DRIVES,
+    FEATURES,
+    LINKS,
+    PERIPHERALS,
+    SERIAL_LINK,
+    SPI_LINK,
+    Between,
+    Machine,
+    Signal,
+    Wiring,
+)
 from boards.toml_file import Misfit, TooLarge
 
 TICK_HZ = 4000  # servo tick that the firmware sets
-ETHERNET_LINK = {"HAS_LINK": 1, "LINK_UDP": 1}
 PLACEHOLDER = "placeholder"  # of the firmware; the name of its file
 
 
@@ -77,6 +87,13 @@ def mask(machine: Machine, name: str) -> int:
     return sum(1 << n for n, axis in enumerate(machine.axes) if axis.has(name))
 
 
+def link_parameters(machine: Machine) -> dict[str, int]:
+    """The parameters of the node that choose the carrier of its link."""
+    carrier = 1 if machine.ip_address else 2 if SPI_LINK in machine.peripherals else 0
+    built = carrier or SERIAL_LINK in machine.peripherals
+    return {"HAS_LINK": int(bool(built)), **({"LINK_CARRIER": carrier} if carrier else {})}
+
+
 def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
     """The parameters of the node or of the relay."""
     if machine.orders:
@@ -90,8 +107,12 @@ def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
         "HAS_DRIVE": mask(machine, "drive"),
         **{name: mask(machine, drive) for drive, name in DRIVES.items()},
         **{name: mask(machine, feature) for feature, (name, _) in FEATURES.items()},
-        **{name: int(each in machine.peripherals) for each, name in PERIPHERALS.items()},
-        **(ETHERNET_LINK if machine.ip_address else {}),
+        **{
+            name: int(each in machine.peripherals)
+            for each, name in PERIPHERALS.items()
+            if each not in LINKS
+        },
+        **link_parameters(machine),
         "HAS_SERIAL_CORE": int(machine.core == "serial"),
         "MEMORY_BYTES": 1024 * machine.memory_kib,
         "PROGRAM_BYTES": 32768,

@@ -25,7 +25,8 @@ TEMPLATES = Environment(
 )
 NODE_OUTPUTS = (  # besides those of the axes
     *("rs485_tx", "rs485_driver_enable", "flash_cs_n", "flash_sclk", "flash_mosi"),
-    *("link_tx", "link_driver_enable", "udp_rx_ready", "udp_tx_valid", "udp_tx_last"),
+    *("link_tx", "link_driver_enable", "link_miso"),
+    *("udp_rx_ready", "udp_tx_valid", "udp_tx_last"),
     *("i2c_scl_low", "i2c_sda_low", "keyboard_clock_low", "keyboard_data_low", "edm_clock_low"),
     *("edm_data_low", "peer_tx", "display_cs_n", "display_sclk", "display_data"),
 )

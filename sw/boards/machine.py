@@ -40,7 +40,9 @@ PERIPHERALS = {  # of a node: its parameter of rtl/node.sv
     "display": "HAS_DISPLAY",
     "status_inputs": "HAS_STATUS_INPUTS",
     "link": "HAS_LINK",
+    "link_spi": "HAS_LINK",
 }
+SERIAL_LINK, SPI_LINK = LINKS = ("link", "link_spi")  # a node has one of them
 FEATURES = {  # of an axis: its parameter of rtl/node.sv, and the feature that it needs
     "sine": ("HAS_SINE", ""),
     "own_chain": ("HAS_OWN_CHAIN", "sine"),
@@ -88,6 +90,10 @@ NODE_SIGNALS = {
     "link_rx": Signal("in", "link", "line of the real-time link, idles high", 1, "link"),
     "link_tx": Signal("out", "link", "line of the real-time link, idles high", needs="link"),
     "link_driver_enable": Signal("out", "link", "1: drive the line", needs="link"),
+    "link_cs_n": Signal("in", "link_spi", "chip select of the host, idles high", 1, "link_spi"),
+    "link_sclk": Signal("in", "link_spi", "clock of the host, idles low", needs="link_spi"),
+    "link_mosi": Signal("in", "link_spi", "data of the host", needs="link_spi"),
+    "link_miso": Signal("out", "link_spi", "data to the host, always driven", needs="link_spi"),
     "i2c_scl": Signal("both", "i2c", "clock of the I2C bus", 1, "i2c"),
     "i2c_sda": Signal("both", "i2c", "data of the I2C bus", 1, "i2c"),
     "keyboard_clock": Signal("both", "keyboard", "clock of the keyboard", 1, "ps2"),
@@ -342,10 +348,12 @@ def check(machine: Machine) -> None:
                 f"{file}: [node] {feature} = {size}, but "
                 f"{f'axis {with_it[0]} has' if with_it else 'no axis has'} the feature {feature}"
             )
-    if machine.ip_address and "link" in machine.peripherals:
+    links = [name for name in LINKS if name in machine.peripherals]
+    if len(links) + bool(machine.ip_address) > 1:
         raise Misfit(
-            f"{file}: [node.ethernet] is the real-time link over Ethernet: the peripheral link is "
-            "the one over a serial line, and a node has one of them"
+            f"{file}: [node.ethernet] is the real-time link over Ethernet, the peripheral "
+            f"{SERIAL_LINK} the one over a serial line, {SPI_LINK} the one over SPI: a node has "
+            "one of them"
         )
     if machine.scope_words and machine.scope_words not in SCOPE_WORDS:
         raise Misfit(

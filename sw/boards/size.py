@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 
-from boards.machine import Axis, Machine
+from boards.machine import LINKS, Axis, Machine
 from figures import record
 from firmware.build import stem_of
 
@@ -100,8 +100,9 @@ def estimate(family: str, machine: Machine) -> Size:
     block_ram = ecp5_block_ram(machine)
     if family == "xc7":  # twice as large
         block_ram = -(-block_ram // 2)
-    shared += PERIPHERALS * any(name != "link" for name in machine.peripherals)
-    shared += LINK * ("link" in machine.peripherals or bool(machine.ip_address))
+    shared += PERIPHERALS * any(name not in LINKS for name in machine.peripherals)
+    linked = any(name in LINKS for name in machine.peripherals) or bool(machine.ip_address)
+    shared += LINK * linked
     shared += ETHERNET * bool(machine.ip_address)
     if followers := sum(axis.has("set_points") for axis in axes):
         shared += SET_POINTS + (followers - 1) * SET_POINTS_AXIS

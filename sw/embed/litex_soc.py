@@ -30,7 +30,7 @@ AXIS_PINS = ("encoder_a", "encoder_b", "estop_open", "bridge_a", "bridge_b", "dr
 NODE_PINS = ("rs485_rx", "rs485_tx", "rs485_driver_enable", "estop_open")
 # levels at which nothing happens: no fault, no switch, an idle line
 HIGH = {"drive_fault_n", "i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data", "edm_clock"}
-HIGH |= {"edm_data", "peer_rx", "sensor_rx", "link_rx"}
+HIGH |= {"edm_data", "peer_rx", "sensor_rx", "link_rx", "link_cs_n"}
 
 
 def idle(module: str, pins: tuple[str, ...]) -> dict[str, int]:

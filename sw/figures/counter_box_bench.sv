@@ -24,7 +24,7 @@ module counter_box_bench #(
     wire [3:0] adc_cs_n, adc_sclk, compare_pulse, bridge_a, bridge_b, step, direction;
     wire [3:0] dac_cs_n, dac_sclk, dac_sdi, drive_enable;
     wire i2c_scl_low, i2c_sda_low, keyboard_clock_low, keyboard_data_low, edm_clock_low;
-    wire link_tx, link_driver_enable, udp_rx_ready, udp_tx_valid, udp_tx_last;
+    wire link_tx, link_driver_enable, link_miso, udp_rx_ready, udp_tx_valid, udp_tx_last;
     wire [ 7:0] udp_tx_data;
     wire [47:0] udp_tx_receiver;
     wire [15:0] udp_tx_length;
@@ -53,6 +53,10 @@ module counter_box_bench #(
         .link_rx        (1'b1),
         .link_tx,
         .link_driver_enable,
+        .link_cs_n      (1'b1),
+        .link_sclk      (1'b0),
+        .link_mosi      (1'b0),
+        .link_miso,
         .udp_rx_valid   (1'b0),
         .udp_rx_data    (8'd0),
         .udp_rx_last    (1'b0),
@@ -115,8 +119,8 @@ module counter_box_bench #(
         1'b0, adc_cs_n, adc_sclk, compare_pulse, bridge_a, bridge_b, step, direction, dac_cs_n,
         dac_sclk, dac_sdi, drive_enable, i2c_scl_low, i2c_sda_low, keyboard_clock_low,
         keyboard_data_low, edm_clock_low, edm_data_low, peer_tx, display_cs_n, display_sclk,
-        display_data, link_tx, link_driver_enable, udp_rx_ready, udp_tx_valid, udp_tx_data,
-        udp_tx_last, udp_tx_receiver, udp_tx_length
+        display_data, link_tx, link_driver_enable, link_miso, udp_rx_ready, udp_tx_valid,
+        udp_tx_data, udp_tx_last, udp_tx_receiver, udp_tx_length
     };
 endmodule
 

@@ -9,13 +9,13 @@ pins of its PHY. It needs LiteX (`make litex`).
 
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from boards import ethernet
+from figures.node_bench import NodeBench
 from moire.made import link_tables as layout
-from moire.made.registers import FIELDS
-from mutation.library import MAILBOX, PROGRAM, Bench, library
+from mutation.library import library
 
 TOP = "ethernet_bench"
 CLK_HZ = 50_000_000
@@ -23,22 +23,15 @@ NIBBLE_CYCLES = 2  # of the clock of the node: 100 Mbit/s
 PREAMBLE = bytes([0x55] * 7 + [0xD5])
 FCS_BYTES = 4
 GAP_BYTES = 12
-START_CYCLES = 8192  # after which the settings of all axes are cleared
 SHORTEST = 60  # bytes of a frame without its FCS; a sender fills it up
 SHORTER = 100  # the times of ARP are so much shorter than in a board
 MAC, IP = 0x024D_C0A8_0132, 0xC0A8_0132  # 192.168.1.50
 HOST_MAC, HOST_IP, HOST_PORT = 0x0200_0000_0001, 0xC0A8_0101, 4000
 BYTE_S = 2 * NIBBLE_CYCLES / CLK_HZ
-WORD = 0xFFFF_FFFF
-OCCUPY = (  # at the beginning of the loop of PROGRAM
-    0x00042283,  # lw t0, 0(s0)
-    0xFFDFF06F,  # j -4
-)
-LOOP = 3  # word of PROGRAM where its loop begins
 
 
-class EthernetNode(Bench):
-    """The node, after its reset. Its registers are accessed by a small program of its soft core."""
+class EthernetNode(NodeBench):
+    """The node, after its reset."""
 
     def __init__(self, axes: int = 1, interface: str = "mii") -> None:
         files = [
@@ -46,36 +39,13 @@ class EthernetNode(Bench):
             ethernet.core(interface, "simulation", CLK_HZ // SHORTER),
         ]
         super().__init__(library(TOP, {"AXES": axes}, more=files))
-        self.axes = axes
-        self.load([*PROGRAM, *[0] * (MAILBOX + 4 - len(PROGRAM))])
-        self.set(rst=1, mac_address=MAC, ip_address=IP, drive_fault_n=(1 << axes) - 1)
-        self.run(16)
-        self.set(rst=0)
-        self.run(START_CYCLES)
+        self.begin(axes, mac_address=MAC, ip_address=IP)
         self.sent_at = 0  # cycle after the last nibble of the last frame sent
         self.nibbles: list[int] = []  # of the frame that the node is sending
         self.began = 0  # cycle in which it began
         self.began_at = 0  # cycle before the first nibble of the last frame sent
         self.reply_at = self.replied_at = 0  # of the last frame of the node: first and last cycle
         self.received: list[bytes] = []  # frames with preamble and FCS
-
-    # ---- registers, as the client of a node has them
-
-    def read_named(self, name: str, axis: int = 0) -> Mapping[str, int]:
-        """The fields of a register, `block.name`."""
-        known = [f for f in FIELDS if f"{f.block}.{f.register}" == name]
-        word = self.access(known[0].address(axis))
-        return {f.field: f.value(word) for f in known}
-
-    def write_named(self, name: str, axis: int = 0, **values: int) -> None:
-        """Writes the fields of a register, the others 0."""
-        known = [f for f in FIELDS if f"{f.block}.{f.register}" == name]
-        word = sum((values.get(f.field, 0) & (1 << f.width) - 1) << f.low for f in known)
-        self.access(known[0].address(axis), word & WORD)
-
-    def occupy_bus(self) -> None:
-        """From now on the soft core only reads a register, again and again."""
-        self.load([*PROGRAM[:LOOP], *OCCUPY, *PROGRAM[LOOP + len(OCCUPY) :]])
 
     # ---- frames
 

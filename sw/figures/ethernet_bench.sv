@@ -67,7 +67,7 @@ module ethernet_bench #(
         .HAS_BRIDGE  (0),
         .HAS_DAC     (0),
         .HAS_LINK    (1),
-        .LINK_UDP    (1),
+        .LINK_CARRIER(1),
         .MEMORY_BYTES(MEMORY_BYTES)
     ) u_node (
         .clk,
@@ -75,6 +75,9 @@ module ethernet_bench #(
         .address        (4'd1),
         .rs485_rx       (1'b1),
         .link_rx        (1'b1),
+        .link_cs_n      (1'b1),
+        .link_sclk      (1'b0),
+        .link_mosi      (1'b0),
         .udp_rx_valid,
         .udp_rx_data,
         .udp_rx_last,

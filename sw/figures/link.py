@@ -5,7 +5,8 @@ how fast is it with eight axes.
 The bad packets go into the Verilated process_link (link_run.cpp). A packet counts as acted upon
 when it causes an access of the register bus or a reply, or when it is not counted as refused
 exactly once. The times are those of a whole simulated node of 60 MHz, with its firmware; those over
-Ethernet of one of 50 MHz with LiteEth (`make litex`).
+Ethernet of one of 50 MHz with LiteEth (`make litex`), those over SPI of one of 60 MHz without
+firmware.
 """
 
 from functools import cache
@@ -16,9 +17,12 @@ from embed.litex_parts import has_ethernet
 from figures.common import Absent, Figure, Quick, bar, console, shares
 from figures.ethernet import BYTE_S, GAP_BYTES, EthernetHost, EthernetNode, frame_bytes
 from figures.ethernet import CLK_HZ as ETHERNET_CLK_HZ
+from figures.spi import CLK_HZ as SPI_CLK_HZ
+from figures.spi import GAP_CYCLES, SCLK_CYCLES, SCLK_HZ, SpiNode
 from figures.synthesis import ELABORATED, elaborated, lut4s, netlist_of, source_of
 from moire.bus.cobs import PacketReader, sealed
 from moire.bus.link_gateway import LONGEST_STUFFED
+from moire.bus.link_spi import reply_in, transfer_of
 from moire.client.bus import Bus
 from moire.client.link import ProcessData
 from moire.client.node import Node as ClientNode
@@ -150,6 +154,45 @@ def link_udp_khz(cycles: int = 20, axes: int = AXES) -> float:
 
 
 @cache
+def spi_times(cycles: int, axes: int) -> tuple[float, float]:
+    """As `cycle_times`, over SPI: a whole transfer with the gap after it, and from the end of the
+    request to the begin of the reply in it. Meanwhile the soft core does nothing but read
+    registers.
+    """
+    node = SpiNode(axes)
+    link = DATA.set_up(cast(ClientNode, node), watchdog_s=0)
+    node.occupy_bus()
+    whole, inside = [], []
+    for _ in range(cycles):
+        request = link.request(0, [0] * link.writes)
+        sent = transfer_of(link, request, SCLK_HZ)
+        received = node.transfer(sent)
+        packet = reply_in(received, link)
+        reply = link.reply(packet)
+        if reply is None or any(reply.refused.values()):
+            raise MoireError(f"no good reply over SPI: {reply}")
+        begin = len(received) - len(received.lstrip(b"\0"))
+        inside.append((begin - len(request)) * 8 / SCLK_HZ)
+        took = node.ended_at - node.began_at
+        if took != 8 * SCLK_CYCLES * len(sent) + 3 * GAP_CYCLES:
+            raise MoireError(f"a transfer of {len(sent)} bytes took {took} cycles")
+        whole.append(took / SPI_CLK_HZ)
+    console.print(
+        f"{axes} axes over SPI, {len(request)} and {len(packet)} bytes, {len(sent)} in a transfer: "
+        f"{1e6 * max(whole):.1f} us, {1e6 * max(inside):.1f} us from the request to the reply"
+    )
+    return max(whole), max(inside)
+
+
+def link_spi_us(cycles: int = 20, axes: int = AXES) -> float:
+    return 1e6 * spi_times(cycles, axes)[1]
+
+
+def link_spi_khz(cycles: int = 20, axes: int = AXES) -> float:
+    return 1e-3 / spi_times(cycles, axes)[0]
+
+
+@cache
 def program(top: Path) -> Path:
     return simulation(DRIVER, top)
 
@@ -227,6 +270,25 @@ FIGURES = {
         "cycles for these 8 axes over UDP at 100 Mbit/s, one after the other, with all bytes of "
         "the frames and the gaps between them",
         ">= 8",
+        SHORT,
+        2,
+    ),
+    "link_spi_us": Figure(
+        link_spi_us,
+        "us",
+        "the same over SPI at 12 MHz: from the last bit of the request to the first one of the "
+        "reply, in the same transfer, at 60 MHz, while the soft core does nothing but read "
+        "registers",
+        "<= 20",
+        SHORT,
+        1,
+    ),
+    "link_spi_khz": Figure(
+        link_spi_khz,
+        "kHz",
+        "cycles for these 8 axes over SPI at 12 MHz, one transfer after the other, with the time "
+        "that a host leaves for the node",
+        ">= 4",
         SHORT,
         2,
     ),

@@ -26,4 +26,6 @@ constexpr uint32_t REPLY_FRAME_WORDS = 7;
 constexpr uint32_t LONGEST_WORDS = 128;
 constexpr uint32_t MOST_VALUES = 121;
 constexpr uint32_t UDP_PORT = 27181;
+constexpr uint32_t SPI_TURNROUND_NS = 5000;
+constexpr uint32_t SPI_TURNROUND_BYTE_NS = 100;
 }  // namespace link_packet

@@ -4,6 +4,7 @@
 #include <asm/termbits.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/spi/spidev.h>
 #include <netdb.h>
 #include <poll.h>
 #include <stdio.h>
@@ -49,21 +50,42 @@ static const char* open_serial(struct carrier* carrier, const char* device, unsi
     return NULL;
 }
 
+static const char* open_spi(struct carrier* carrier, const char* device, unsigned long hz) {
+    static const uint8_t mode = SPI_MODE_0, bits = 8;
+    if (hz < SPI_LEAST_HZ || hz > SPI_MOST_HZ)
+        return "the clock of the SPI must be 1000 to 50000000 Hz";
+    carrier->hz = (unsigned)hz;
+    carrier->file = open(device, O_RDWR | O_CLOEXEC);
+    if (carrier->file < 0)
+        return errno == ENOENT ? "there is no such SPI device: switch the SPI of this computer on"
+                               : "the SPI device cannot be opened";
+    if (ioctl(carrier->file, SPI_IOC_WR_MODE, &mode) ||
+        ioctl(carrier->file, SPI_IOC_WR_BITS_PER_WORD, &bits))
+        return "the device is no SPI device, or it has no mode 0";
+    if (flock(carrier->file, LOCK_EX | LOCK_NB)) return "another program uses the SPI device";
+    return NULL;
+}
+
 const char* carrier_open(struct carrier* carrier, const char* where) {
+    static const char* const forms = "write udp:HOST:PORT, serial:DEVICE:BAUD or spi:DEVICE:HZ";
     char text[128], *last;
     *carrier = (struct carrier){.file = -1};
     if (strlen(where) >= sizeof text) return "the place of the node is too long";
     strcpy(text, where);
     char* first = strchr(text, ':');
     last = strrchr(text, ':');
-    if (!first || first == last) return "write udp:HOST:PORT or serial:DEVICE:BAUD";
+    if (!first || first == last) return forms;
     *first = *last = 0;
-    const char* why = "write udp:HOST:PORT or serial:DEVICE:BAUD";
-    carrier->serial = strcmp(text, "serial") == 0;
-    if (carrier->serial)
+    const char* why = forms;
+    if (strcmp(text, "serial") == 0) {
+        carrier->kind = CARRIER_SERIAL;
         why = open_serial(carrier, first + 1, (unsigned)strtoul(last + 1, NULL, 10));
-    else if (strcmp(text, "udp") == 0)
+    } else if (strcmp(text, "spi") == 0) {
+        carrier->kind = CARRIER_SPI;
+        why = open_spi(carrier, first + 1, strtoul(last + 1, NULL, 10));
+    } else if (strcmp(text, "udp") == 0) {
         why = open_udp(carrier, first + 1, last + 1);
+    }
     if (why) carrier_close(carrier);
     return why;
 }
@@ -104,8 +126,39 @@ static size_t unstuffed(const uint8_t* in, size_t length, uint8_t* packet) {
     return out;
 }
 
+// One transfer: the request, zeros while the node plays it, and zeros while the reply comes. What
+// comes takes the place of what is sent.
+static bool transfer(struct carrier* carrier, const uint8_t* packet, size_t length) {
+    size_t whole = length + SPI_TURNROUND(length + carrier->reply, carrier->hz) + carrier->reply;
+    memcpy(carrier->transferred, packet, length);
+    memset(carrier->transferred + length, 0, whole - length);
+    struct spi_ioc_transfer message = {
+        .tx_buf = (uintptr_t)carrier->transferred,
+        .rx_buf = (uintptr_t)carrier->transferred,
+        .len = (uint32_t)whole,
+        .speed_hz = carrier->hz,
+        .bits_per_word = 8,
+    };
+    bool good = ioctl(carrier->file, SPI_IOC_MESSAGE(1), &message) == (int)whole;
+    carrier->received = good ? whole : 0;
+    return good;
+}
+
+// The reply in the last transfer begins with its first byte that is not 0. It is taken once.
+static size_t take_transferred(struct carrier* carrier, uint8_t* packet) {
+    size_t at = 0, length = carrier->received;
+    carrier->received = 0;
+    while (at < length && carrier->transferred[at] == 0) at++;
+    length -= at;
+    if (length > carrier->reply) length = carrier->reply;
+    memcpy(packet, carrier->transferred + at, length);
+    return length;
+}
+
 bool carrier_send(struct carrier* carrier, const uint8_t* packet, size_t length) {
-    if (!carrier->serial) return send(carrier->file, packet, length, 0) == (ssize_t)length;
+    if (carrier->kind == CARRIER_SPI) return transfer(carrier, packet, length);
+    if (carrier->kind == CARRIER_UDP)
+        return send(carrier->file, packet, length, 0) == (ssize_t)length;
     uint8_t bytes[sizeof carrier->stuffed];
     size_t count = stuffed(packet, length, bytes);
     return write(carrier->file, bytes, count) == (ssize_t)count;
@@ -136,7 +189,7 @@ static size_t take_stuffed(struct carrier* carrier, uint8_t* packet) {
 
 // What has come without a wait; 0: no whole packet.
 static size_t take(struct carrier* carrier, uint8_t* packet) {
-    if (!carrier->serial) {
+    if (carrier->kind == CARRIER_UDP) {
         ssize_t count = recv(carrier->file, packet, PACKET_LONGEST, 0);
         return count > 0 ? (size_t)count : 0;
     }
@@ -151,6 +204,7 @@ static size_t take(struct carrier* carrier, uint8_t* packet) {
 }
 
 size_t carrier_receive(struct carrier* carrier, uint8_t* packet, int64_t deadline) {
+    if (carrier->kind == CARRIER_SPI) return take_transferred(carrier, packet);
     for (;;) {
         size_t length = take(carrier, packet);
         if (length || !readable(carrier, deadline)) return length;

@@ -28,7 +28,8 @@ MODULE_LICENSE("GPL");
 enum { MOST_NODES = 8, MOST_NAME = HAL_NAME_LEN + 1 };
 
 static char* node[MOST_NODES];
-RTAPI_MP_ARRAY_STRING(node, MOST_NODES, "udp:HOST:PORT or serial:DEVICE:BAUD of each node");
+RTAPI_MP_ARRAY_STRING(node, MOST_NODES,
+                      "udp:HOST:PORT, serial:DEVICE:BAUD or spi:DEVICE:HZ of each node");
 static int axes[MOST_NODES] = {1, 1, 1, 1, 1, 1, 1, 1};
 RTAPI_MP_ARRAY_INT(axes, MOST_NODES, "axes of each node");
 static int session[MOST_NODES];

@@ -79,6 +79,7 @@ bool node_open(struct node* node, const char* where, unsigned axes, uint32_t ses
     };
     const char* why = carrier_open(&node->carrier, where);
     if (why) return misfit(node, why);
+    node->carrier.reply = packet_reply_length(&node->link);
     if (check(node)) return true;
     carrier_close(&node->carrier);
     return false;

@@ -9,7 +9,8 @@ MACHINE is a machine of constraints/machines, or a .toml file. docs/linuxcnc.md 
 
 import random
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jinja2
@@ -24,6 +25,7 @@ ROTARY = "ABC"
 LEAST_DELAY_MS = 4.0  # a set-point is sent when the next one is known, 8 servo ticks ahead
 MARGIN = 2.0  # of the following error that LinuxCNC sees, over the one of the delay
 SERVO_MS = 1.0
+CARRIERS = {"udp": "udp:HOST:PORT", "serial": "serial:DEVICE:BAUD", "spi": "spi:DEVICE:HZ"}
 
 
 @dataclass(frozen=True)
@@ -43,11 +45,18 @@ class Joint:
     take_up: float = 0.0  # how fast the motor takes it up, beyond the target, in mm/s
     hysteresis: float = 0.0  # how far the target must come back until that is a reversal, in um
     sensor: str = "table"  # the side of the backlash on which the sensor is, or "motor"
+    gantry: str = ""  # the axis whose second side it is
+    apart: float = 0.0  # most that its position may differ from that of the other side
+
+    @property
+    def letter(self) -> str:
+        """The axis of LinuxCNC that it moves."""
+        return self.gantry or self.name
 
     @property
     def rotary(self) -> bool:
         """Whether it is measured in degrees."""
-        return self.name in ROTARY
+        return self.letter in ROTARY
 
 
 @dataclass(frozen=True)
@@ -67,7 +76,7 @@ class Configuration:
     title: str
     address: int  # on the bus
     bus: str  # port of the bus, for the set-up; empty: another program sets the link up
-    node: str  # real-time link, serial:DEVICE:BAUD or udp:HOST:PORT
+    node: str  # real-time link, in one of the forms of CARRIERS
     delay_ms: float  # of a set-point
     period_ns: int
     axes: list[Joint]
@@ -77,6 +86,22 @@ class Configuration:
     simulated: bool = False
     display: str = "axis"
     python: str = sys.executable  # that runs the set-up
+
+    @property
+    def gantries(self) -> list[tuple[int, int]]:
+        """The numbers of the joints of each gantry, its first side before the second one."""
+        first = {axis.name: number for number, axis in enumerate(self.axes)}
+        return [(first[axis.gantry], n) for n, axis in enumerate(self.axes) if axis.gantry]
+
+    @property
+    def sequences(self) -> list[int]:
+        """HOME_SEQUENCE of each joint; below 0: with the others of this number, which move to
+        their places after homing together.
+        """
+        shift = 1 if self.gantries else 0  # there is no -0
+        both = {number for pair in self.gantries for number in pair}
+        found = [axis.sequence + shift for axis in self.axes]
+        return [-sequence if n in both else sequence for n, sequence in enumerate(found)]
 
     @property
     def behind_ms(self) -> float:
@@ -95,6 +120,31 @@ def backlash_of(row: Table, table: Table) -> tuple[float, float]:
     if backlash and "backlash" not in row.left.get("features", []):
         raise table.misfit("backlash_um needs the feature backlash of the axis")
     return backlash, take_up
+
+
+def second_side(row: Table, joints: Sequence[Joint]) -> Joint:
+    """The table [axis.linuxcnc] of the second side of a gantry: travel, velocities and the order of
+    homing are those of the first.
+    """
+    table = row.table("linuxcnc", True)
+    gantry = table.take("gantry", str)
+    first = next((one for one in joints if one.name == gantry and not one.gantry), None)
+    if first is None or any(one.gantry == gantry for one in joints):
+        raise table.misfit(f"gantry {gantry!r} must be an axis before this one with a single side")
+    period, apart = table.take("period_um", float, first.period_um), table.take("apart_um", float)
+    if period <= 0 or apart <= 0:
+        raise table.misfit(f"period_um {period:g} and apart_um {apart:g} must be above 0")
+    backlash, take_up = backlash_of(row, table)
+    table.close()
+    return replace(
+        first,
+        name=row.take("name", str),
+        gantry=gantry,
+        period_um=period,
+        apart=apart / 1000,
+        backlash=backlash,
+        take_up=take_up,
+    )
 
 
 def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
@@ -134,7 +184,9 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
         take_up=take_up,
         hysteresis=hysteresis,
         sensor=sensor,
-        **values,
+        period_um=values["period_um"],
+        velocity=values["velocity"],
+        acceleration=values["acceleration"],
     )
 
 
@@ -157,8 +209,8 @@ def load(name: str) -> Configuration:
         raise file.misfit("no axis has a drive: LinuxCNC has nothing to move")
     table = file.table("linuxcnc", True)
     bus, node = table.take("bus", str), table.take("node", str)
-    if len(node.split(":")) < 3 or node.split(":")[0] not in ("udp", "serial"):
-        raise table.misfit(f"node {node!r}: write udp:HOST:PORT or serial:DEVICE:BAUD")
+    if len(node.split(":")) < 3 or node.split(":")[0] not in CARRIERS:
+        raise table.misfit(f"node {node!r}: write {', '.join(CARRIERS.values())}")
     delay = table.take("delay_ms", float, 5.0)
     if delay < LEAST_DELAY_MS:
         raise table.misfit(f"delay_ms {delay:g}: a set-point needs {LEAST_DELAY_MS:g} at least")
@@ -166,7 +218,11 @@ def load(name: str) -> Configuration:
     behind = delay + 2 * SERVO_MS
     rows = file.rows("axis")
     driven = [row for row in rows if row.left.get("drives")]
-    joints = [joint_of(row, number, behind) for number, row in enumerate(driven)]
+    joints: list[Joint] = []
+    for row in driven:
+        number = sum(not joint.gantry for joint in joints)
+        is_second = "gantry" in row.left.get("linuxcnc", {})
+        joints += [second_side(row, joints) if is_second else joint_of(row, number, behind)]
     others = [spindle_of(row) for row in rows if row not in driven]
     if driven != rows[: len(driven)] or len(others) > 1:
         raise file.misfit("LinuxCNC needs the axes with a drive first, then one spindle at most")
@@ -200,7 +256,9 @@ def texts(found: Configuration) -> dict[str, str]:
         "session": found.session or random.SystemRandom().randint(1, LONGEST_SESSION),
         "behind_ms": found.behind_ms,
         "node_axes": len(found.axes) + (found.spindle is not None),
-        "letters": "".join(axis.name for axis in found.axes),
+        "letters": "".join(axis.letter for axis in found.axes),
+        "gantries": found.gantries,
+        "sequences": found.sequences,
         "velocity": max(axis.velocity for axis in found.axes),
         "screen": found.display == "axis",
     }

@@ -39,7 +39,9 @@ DESIGNS = {  # diagrams of a design; all others are in the node
     "display_port": ("display_port.sv",),
 }
 MOST = 400  # connections of several diagrams in one build
-ABSENT = {"node": ("g_serial_core.", "g_link.g_udp.")}  # instances that a design does not have
+ABSENT = {
+    "node": ("g_serial_core.", "g_link.g_udp.", "g_link.g_spi.")
+}  # instances that a design does not have
 ZERO = re.compile(r"(\d*'[bdh]?0+|0)")
 ONE = re.compile(r"(1'b1|1'd1)")
 

@@ -13,7 +13,7 @@ BAUD = 115_200  # of the firmware after a reset
 START_CYCLES = 20_000  # of the firmware, more than it needs
 MOST_CYCLES = 20_000  # until it answers
 HIGH = ("drive_fault_n", "i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data", "edm_clock")
-HIGH += ("edm_data", "peer_rx", "sensor_rx", "rs485_rx", "link_rx")
+HIGH += ("edm_data", "peer_rx", "sensor_rx", "rs485_rx", "link_rx", "link_cs_n")
 LOW = ("flash_miso", "estop_open", "encoder_a", "encoder_b", "encoder_z", "probe", "adc_sin")
 LOW += ("adc_cos", "limit_low_open", "limit_high_open", "edm_status")
 

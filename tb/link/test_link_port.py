@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""link_port: requests of the host's codec on its serial line or in datagrams are answered there and
-reach the register bus; damaged lines; the watchdog; and a node without it. Its blocks have models
-of their own.
+"""link_port: requests of the host's codec on its serial line, in datagrams or in SPI transfers are
+answered there and reach the register bus; damaged lines; the watchdog; and a node without it. Its
+blocks have models of their own.
 """
 
 import random
@@ -13,6 +13,7 @@ from cocotb.triggers import FallingEdge, ReadOnly
 
 from moire.bus.cobs import sealed, unstuff
 from moire.bus.link import Link, Spare
+from moire.bus.link_spi import reply_bytes, reply_in
 from moire.made.registers import FIELDS
 from tb.bench import needs, run, start
 from tb.serial.uart_rx import UartRx, character, line
@@ -23,8 +24,10 @@ TURNAROUND = 2  # bits
 CLK_HZ = 1_000_000
 IDLE = dict(select=0, write=0, word=0, wdata=0, ready=1, link_rdata=0, now=0, link_rx=1)
 IDLE |= dict(drive_on=0, udp_rx_valid=0, udp_rx_data=0, udp_rx_last=0, udp_rx_error=0)
-IDLE |= dict(udp_rx_sender=0, udp_tx_ready=1)
+IDLE |= dict(udp_rx_sender=0, udp_tx_ready=1, link_cs_n=1, link_sclk=0, link_mosi=0)
 HOST = 0xC0A8_0101_0FA0  # address and port
+PERIOD, HIGH = 5, 2  # cycles of the clock of the SPI
+TURNROUND = 20  # bytes
 
 
 class Port:
@@ -91,6 +94,25 @@ class Port:
             return None
         return int(self.dut.udp_tx_receiver.value), bytes(self.datagrams[0])
 
+    async def transfer(self, content, bits=None):
+        """An SPI transfer at its highest rate, or its first bits; returns the bytes read."""
+        await self.clk(link_cs_n=0)
+        await self.clk(link_cs_n=0)
+        read = []
+        for n in range(8 * len(content) if bits is None else bits):
+            bit = content[n // 8] >> 7 - n % 8 & 1
+            for _ in range(PERIOD - HIGH):
+                await self.clk(link_cs_n=0, link_mosi=bit)
+            read.append(int(self.dut.link_miso.value))  # at the rise of the clock
+            for _ in range(HIGH):
+                await self.clk(link_cs_n=0, link_mosi=bit, link_sclk=1)
+        for _ in range(2):
+            await self.clk(link_cs_n=0)
+        for _ in range(2):
+            await self.clk()
+        words = ["".join(map(str, read[n : n + 8])) for n in range(0, len(read), 8)]
+        return bytes(int(word, 2) for word in words)
+
     async def write(self, register, **values):
         """A register of the port by its fields."""
         fields = [f for f in FIELDS if (f.block, f.register) == ("link", register)]
@@ -142,12 +164,21 @@ async def begin(dut):
     return port
 
 
+def has(dut, carrier):
+    built = int(dut.BUILT.value) and int(dut.CARRIER.value) == carrier
+    needs(built, f"a node without a link of carrier {carrier}")
+
+
 def has_line(dut):
-    needs(int(dut.BUILT.value) and not int(dut.UDP.value), "a node without a link on a line")
+    has(dut, 0)
 
 
 def has_datagrams(dut):
-    needs(int(dut.BUILT.value) and int(dut.UDP.value), "a node without a link in datagrams")
+    has(dut, 1)
+
+
+def has_spi(dut):
+    has(dut, 2)
 
 
 @cocotb.test()
@@ -247,6 +278,53 @@ async def while_a_drive_is_on_datagrams_of_others_and_damaged_ones_are_refused(d
     assert await port.read("framing_errors") == dict(value=0)
 
 
-@pytest.mark.parametrize("built, udp", [(1, 0), (1, 1), (0, 0)])
-def test_link_port(built, udp):
-    run("link_port", __file__, CLK_HZ=CLK_HZ, BUILT=built, UDP=udp)
+@cocotb.test()
+async def requests_in_spi_transfers_are_played_and_answered(dut):
+    has_spi(dut)
+    port = await begin(dut)
+    host = await port.set_up()
+    for value in range(3):
+        request = host.request(0, [value, 7], Spare(0x500, 33))
+        read = await port.transfer(request + bytes(TURNROUND + reply_bytes(host)))
+        assert not any(read[: len(request)])
+        reply = host.reply(reply_in(read, host))
+        assert reply and reply.values == (0x411, 0x415) and not any(reply.refused.values())
+        assert port.registers == {0x400: value, 0x404: 7, 0x500: 33}
+    assert await port.read("framing_errors") == dict(value=0)
+
+
+@cocotb.test()
+async def damaged_and_cut_spi_transfers_are_counted_and_the_next_request_is_answered(dut):
+    has_spi(dut)
+    port = await begin(dut)
+    host = await port.set_up()
+    packet = host.request(0, [1, 2])
+    whole = packet + bytes(TURNROUND + reply_bytes(host))
+    bent = bytearray(whole)
+    bent[5] ^= 4
+    assert not any(await port.transfer(bytes(bent)))
+    for bits in (1, 3, 100, 8 * len(packet) - 1):
+        assert not any(await port.transfer(whole, bits))
+    slipped = int.from_bytes(whole, "big") >> 1  # an edge too many at the begin
+    assert not any(await port.transfer(slipped.to_bytes(len(whole), "big")))
+    for _ in range(30):  # edges of another device's transfer
+        for level in (1, 1, 0, 0):
+            await port.clk(link_sclk=level, link_mosi=level)
+    assert not port.registers and await port.read("framing_errors") == dict(value=4)
+    read = await port.transfer(whole)
+    reply = host.reply(reply_in(read, host))
+    assert reply and reply.refused["damaged"] == 6 and port.registers == {0x400: 1, 0x404: 2}
+    assert not any(await port.transfer(whole)), "it is replayed"
+    again = host.request(0, [3, 4])
+    await port.transfer(again + bytes(TURNROUND), 8 * (len(again) + TURNROUND))
+    assert port.registers == {0x400: 3, 0x404: 4}, "a request is played when it is whole"
+    last = host.request(0, [5, 6])
+    read = await port.transfer(last + bytes(TURNROUND + reply_bytes(host)))
+    assert host.reply(reply_in(read, host)).values == (0x411, 0x415)
+    assert await port.read("framing_errors") == dict(value=5)
+    assert (await port.read("refused")) == dict(damaged=6, foreign=0, wrong_length=0, replayed=1)
+
+
+@pytest.mark.parametrize("built, carrier", [(1, 0), (1, 1), (1, 2), (0, 0)])
+def test_link_port(built, carrier):
+    run("link_port", __file__, CLK_HZ=CLK_HZ, BUILT=built, CARRIER=carrier)

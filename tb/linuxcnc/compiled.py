@@ -8,12 +8,15 @@ from pathlib import Path
 import pytest
 
 from linuxcnc_config.headless import SOURCES
+from moire.bus.link_spi import MOST_HZ as SPI_MOST_HZ
+from moire.bus.link_spi import turnround_bytes
 from moire.made import link_tables as layout
 from twin.compiled.host_library import host_library
 
 ZLIB = Path("/usr/include/zlib.h")
 LONGEST = 4 * layout.LONGEST_WORDS
 OPTIONS = ["-std=gnu11", "-D_GNU_SOURCE", "-Wl,--no-as-needed", "-lz", "-lm"]
+OPTIONS += ["-Wl,--wrap=open", "-Wl,--wrap=ioctl"]
 NAMES = ("packet", "carrier", "node", "node_clock", "latch", "probe")
 
 
@@ -82,9 +85,12 @@ class Carrier(ctypes.Structure):
 
     _fields_ = [
         ("file", ctypes.c_int),
-        ("serial", ctypes.c_bool),
+        ("kind", ctypes.c_int),
+        ("reply", ctypes.c_size_t),
+        ("hz", ctypes.c_uint),
         ("received", ctypes.c_size_t),
         ("stuffed", ctypes.c_uint8 * (LONGEST + 16)),
+        ("transferred", ctypes.c_uint8 * (2 * LONGEST + turnround_bytes(2 * LONGEST, SPI_MOST_HZ))),
     ]
 
 
@@ -103,12 +109,20 @@ class Node(ctypes.Structure):
     ]
 
 
+Transfer = ctypes.CFUNCTYPE(
+    ctypes.c_bool, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32
+)
+
+
 @cache
 def driver() -> ctypes.CDLL:
-    """The library; the test is skipped by name where zlib's header is not installed."""
+    """The library; the test is skipped by name where zlib's header is not installed. Its SPI
+    devices are those of spidev.c, where `spidev_set(FILE, Transfer)` puts one.
+    """
     if not ZLIB.exists():
         pytest.skip("zlib1g-dev is not installed: make linuxcnc")
-    found = host_library("linuxcnc", [SOURCES / f"{name}.c" for name in NAMES], OPTIONS)
+    sources = [*(SOURCES / f"{name}.c" for name in NAMES), Path(__file__).with_name("spidev.c")]
+    found = host_library("linuxcnc", sources, [*OPTIONS, f"-I{SOURCES}"])
     found.packet_request.restype = ctypes.c_size_t
     found.packet_reply.restype = ctypes.c_bool
     found.packet_reply_length.restype = ctypes.c_size_t

@@ -113,6 +113,7 @@ class IdealAxis:
     spin: float = 0.0  # and periods per tick
     sources: int = 0  # of captures
     captured: list[float] = field(default_factory=list)
+    beside: float = 0.0  # of its target, in periods: a side of a gantry that does not follow
 
     def fault(self, name: str) -> None:
         """Latches a fault: the drive goes off."""
@@ -241,7 +242,7 @@ class IdealNode:
                 names[low] = lambda: round(value() * POSITION_LSB) % WORD
                 names[low + 4] = lambda: round(value() * POSITION_LSB) >> 32 & WORD - 1
 
-            wide("position", lambda axis=axis: axis.position)
+            wide("position", lambda axis=axis: axis.position + axis.beside)
             wide("target", lambda axis=axis: axis.position)
             wide("captured_position", lambda axis=axis: axis.captured[0], block="feedback")
             drive = n < self.drives
@@ -340,6 +341,10 @@ class IdealNode:
             name: requests >> field_of("node", "axis_requests", name).low >> n & 1
             for name in ("enable", "home", "stream", "reset_faults")
         }
+
+    def slip(self, axis: int, periods: float) -> None:
+        """From now on an axis is beside its target."""
+        self.axes[axis].beside = periods
 
     def press_estop(self, pressed: bool = True) -> None:
         """The emergency stop of the node."""

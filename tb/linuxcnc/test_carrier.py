@@ -14,6 +14,7 @@ from tb.bench import seed
 from tb.linuxcnc.compiled import LONGEST, Carrier, driver
 
 PATIENCE_NS = 2_000_000_000
+FORMS = "write udp:HOST:PORT, serial:DEVICE:BAUD or spi:DEVICE:HZ"
 
 
 @pytest.fixture
@@ -121,8 +122,8 @@ def test_noise_on_a_serial_port_costs_only_the_packet_in_it(carrier):
 @pytest.mark.parametrize(
     "where, why",
     [
-        ("tcp:localhost:5", "write udp:HOST:PORT or serial:DEVICE:BAUD"),
-        ("udp:localhost", "write udp:HOST:PORT or serial:DEVICE:BAUD"),
+        ("tcp:localhost:5", FORMS),
+        ("udp:localhost", FORMS),
         ("udp:no.such.host.invalid:5", "the address of the node is unknown"),
         ("serial:/dev/no_such_port:115200", "the serial port cannot be opened"),
         ("serial:/dev/null:115200", "the device is no serial port"),

@@ -8,7 +8,7 @@ from unittest.mock import Mock
 import pytest
 
 from linuxcnc_config.__main__ import main
-from linuxcnc_config.generate import Misfit, load, texts
+from linuxcnc_config.generate import CARRIERS, Misfit, load, texts
 from linuxcnc_config.lists import READS, WRITES
 from linuxcnc_config.set_up import Backlash, Unfit, set_up
 from linuxcnc_config.set_up import main as set_up_program
@@ -87,6 +87,52 @@ def test_an_axis_without_a_drive_is_the_encoder_of_the_spindle(tmp_path):
         assert "moire.0.encoder.1." in line and line.endswith(f" spindle.0.{end}")
 
 
+GANTRY = """
+[[axis]]
+name = "X2"
+drives = ["stepper"]
+[axis.linuxcnc]
+gantry = "X"
+apart_um = 50
+"""
+
+
+def test_the_second_side_of_a_gantry_is_a_joint_of_the_same_axis(tmp_path):
+    found = written(tmp_path)
+    Path(found).write_text(Path(found).read_text() + GANTRY)
+    made = texts(load(found))
+    ini, hal = made["mill.ini"], made["mill.hal"]
+    assert "KINEMATICS = trivkins coordinates=XX kinstype=BOTH" in ini and "\nJOINTS = 2\n" in ini
+    assert ini.count("[AXIS_X]") == 1 and "[AXIS_X2]" not in ini
+    assert re.findall(r"HOME_SEQUENCE = (\S+)", ini) == ["-1", "-1"], "they move home together"
+    assert "setp wcomp.0.max 0.05" in hal and "are more than 50 um apart" in hal
+    assert "net X-square => iocontrol.0.emc-enable-in" in hal
+
+
+def test_axes_beside_a_gantry_are_homed_in_the_order_of_their_numbers_without_a_gap(tmp_path):
+    found = written(tmp_path)
+    second = MILL[MILL.index("[[axis]]") :].replace('"X"', '"Y"')
+    Path(found).write_text(MILL + GANTRY + second)
+    assert re.findall(r"HOME_SEQUENCE = (\S+)", texts(load(found))["mill.ini"]) == ["-1", "-1", "2"]
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (('gantry = "X"', 'gantry = "Y"'), "gantry 'Y' must be an axis before this one"),
+        (("apart_um = 50", "apart_um = 0"), "apart_um 0 must be above 0"),
+        (("apart_um = 50", ""), "apart_um is missing"),
+        (("apart_um = 50", "apart_um = 50\nvelocity = 3"), "there is no key velocity"),
+        (("[[axis]]", GANTRY.replace("X2", "X3") + "[[axis]]"), "one with a single side"),
+    ],
+)
+def test_a_gantry_that_does_not_fit_is_refused_in_a_line(tmp_path, change, words):
+    path = tmp_path / "mill.toml"
+    path.write_text(MILL + GANTRY.replace(*change, 1))
+    with pytest.raises(Misfit, match=re.escape(words)):
+        load(str(path))
+
+
 @pytest.mark.parametrize(
     "text, words",
     [
@@ -126,7 +172,7 @@ def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(
         (("period_um = 4\n", ""), "period_um is missing"),
         (("velocity = 50", "velocity = 50\nspeed = 2"), "there is no key speed"),
         (('name = "X"', 'name = "left"'), "name 'left': LinuxCNC knows the axes X, Y, Z"),
-        (("serial:/dev/ttyUSB1:3000000", "ttyUSB1"), "write udp:HOST:PORT or serial:DEVICE:BAUD"),
+        (("serial:/dev/ttyUSB1:3000000", "ttyUSB1"), f"write {', '.join(CARRIERS.values())}"),
         (('node = "serial', 'delay_ms = 2\nnode = "serial'), "delay_ms 2: a set-point needs 4"),
         (
             ("velocity = 50", "velocity = 50\nbacklash_um = 5"),

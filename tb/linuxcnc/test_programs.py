@@ -60,6 +60,30 @@ G76 P{PITCH_MM} Z3 I-1 J0.2 K0.6 R1 Q0 H0 E0 L0
 M5
 M2
 """
+GANTRY = """
+title = "portal"
+[node]
+image = "steps_stream"
+memory_kib = 64
+address = 1
+[linuxcnc]
+bus = "/dev/ttyUSB0"
+node = "serial:/dev/ttyUSB1:3000000"
+""" + "".join(
+    f"""
+[[axis]]
+name = "{name}"
+drives = ["stepper"]
+[axis.linuxcnc]
+{keys}
+"""
+    for name, keys in {
+        name: 'gantry = "Y"\napart_um = 50'
+        if name == "Y2"
+        else "period_um = 4\ntravel = [-1, 149]\nvelocity = 50\nacceleration = 500"
+        for name in ("X", "Y", "Y2", "Z")
+    }.items()
+)
 LATCHES = [f"moire.0.axis.{n}.position-latch" for n in range(3)]
 COUNTS = [f"moire.0.encoder.3.{name}" for name in ("count", "rawcounts")]
 PINS = {  # steps after a program
@@ -267,6 +291,35 @@ def test_a_node_whose_power_was_cut_is_set_up_and_homed_again(day):
     assert day.last("power").max() < MOST_ERROR_MM
     for axis in day.node.axes[:3]:
         assert (axis.late, axis.refused) == (0, 0) and axis.accepted > 500
+
+
+def test_a_gantry_whose_sides_come_apart_stops_the_machine_until_it_is_square(tmp_path):
+    (tmp_path / "gantry.toml").write_text(GANTRY)
+    node = IdealNode(4)
+    away = partial(IdealNode.slip, axis=2, periods=0.06 * PERIODS_PER_MM)
+    events = [
+        (lambda node: node.axes[3].homed and node.axes[1].position > 4 * PERIODS_PER_MM, away),
+        (
+            lambda node: node.axes[2].beside and not node.axes[2].enabled,
+            partial(IdealNode.slip, axis=2, periods=0),
+        ),
+    ]
+    steps = [["on"], ["home"], ["start", "line.ngc"], ["stopped"], ["on"]]
+    steps += [["start", "line.ngc"], ["finish"]]
+    with Served(node, events) as served:
+        set_up(node, 4, SESSION)
+        port = f"udp:127.0.0.1:{served.port}"
+        found = load(str(tmp_path / "gantry.toml"))
+        found = replace(found, bus="", node=port, session=SESSION, simulated=True)
+        folder = tmp_path / "run"
+        ran = headless.run(found, folder, steps, {"line.ngc": "G21 G90 G64\nG1 Y9 F600\nM2\n"})
+    assert ran.done, ran.printed + str(ran.report)
+    assert "moire: Y and Y2 are more than 50 um apart" in ran.report[-1]["messages"]
+    first, second = numpy.array(node.path)[:, 2:4].T / PERIODS_PER_MM
+    apart = abs(first - second)
+    before = numpy.flatnonzero(first < 4.0)[-1]
+    assert apart[:before].max() < LSB_MM and apart[-1] < LSB_MM and abs(first[-1] - 9) < LSB_MM
+    assert apart.max() < 0.05, "after the stop LinuxCNC brings the sides together"
 
 
 def test_a_node_of_another_build_is_refused_in_a_sentence(tmp_path):

@@ -294,7 +294,7 @@ def over_ethernet(folder, address="192.168.1.50", more=""):
 
 def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(tmp_path):
     design = fit(board.named("colorlight_i5"), machine.load(over_ethernet(tmp_path)))
-    assert (design.parameters["HAS_LINK"], design.parameters["LINK_UDP"]) == (1, 1)
+    assert (design.parameters["HAS_LINK"], design.parameters["LINK_CARRIER"]) == (1, 1)
     made = generate.files(design)
     assert f".mac_address(48'd{0x024D_C0A8_0132})," in made["top.sv"]
     assert f".ip_address(32'd{0xC0A8_0132}),  // 192.168.1.50" in made["top.sv"]
@@ -325,6 +325,53 @@ def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(tmp_path):
 def test_a_wrong_address_is_refused(address, more, words, tmp_path):
     path = over_ethernet(tmp_path, address, more)
     assert refusal(lambda: machine.load(path)).startswith(f"{path}: {words}")
+
+
+SPI_PINS = """
+link_cs_n = "J2 gp23"
+link_sclk = "J2 gn23"
+link_mosi = "J2 gp24"
+link_miso = "J2 gn24"
+"""
+
+
+def over_spi(folder, volts=3.3, pins=SPI_PINS):
+    """The mill with its link over SPI on an ULX3S."""
+    node = "memory_kib = 64\naddress = 1\n"
+    last = 'rs485_driver_enable = "J2 gp22"\n'
+    between = f'[between.link_spi]\npart = "none"\nvolts = {volts}\n\n[between.encoder]'
+    return edited(
+        folder,
+        "constraints/machines/mill.toml",
+        (node, f'{node}peripherals = ["link_spi"]\n'),
+        (last, last + pins),
+        ("[between.encoder]", between),
+    )
+
+
+def test_a_link_over_spi_has_four_pins(tmp_path):
+    design = fit(board.named("ulx3s_25f"), machine.load(over_spi(tmp_path)))
+    assert (design.parameters["HAS_LINK"], design.parameters["LINK_CARRIER"]) == (1, 2)
+    made = generate.files(design)
+    for name in ("cs_n", "sclk", "mosi"):
+        assert f".link_{name}(link_{name})" in made["top.sv"]
+    assert "assign link_miso = node_link_miso;" in made["top.sv"]
+    assert 'LOCATE COMP "link_miso" SITE "D16";' in made["pins.lpf"]
+    for words in ("chip select of the host", "data to the host"):
+        assert words in made["wiring.html"]
+    plain = generate.files(fit(board.named("ulx3s_25f"), machine.named("mill")))
+    assert ".link_cs_n(1'b1)" in plain["top.sv"] and "LINK_CARRIER" not in plain["top.sv"]
+
+
+def test_a_link_over_spi_with_a_wrong_level_or_beside_another_link_is_refused(tmp_path):
+    path = over_spi(tmp_path, volts=5.0)
+    found = refusal(lambda: fit(board.named("ulx3s_25f"), machine.load(path)))
+    assert "link_cs_n comes with 5 V" in found
+    path = over_spi(tmp_path, pins=SPI_PINS.replace("link_miso", "# link_miso"))
+    found = refusal(lambda: fit(board.named("ulx3s_25f"), machine.load(path)))
+    assert "link_miso has no pin" in found
+    path.write_text(path.read_text().replace('["link_spi"]', '["link", "link_spi"]'))
+    assert "a node has one of them" in refusal(lambda: machine.load(path))
 
 
 def test_a_link_over_ethernet_needs_a_phy_and_no_serial_line(tmp_path):

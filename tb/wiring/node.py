@@ -44,6 +44,7 @@ IDLE = dict(
     peer_rx=1,
     sensor_rx=1,
     link_rx=1,
+    link_cs_n=1,
     i2c_scl=1,
     i2c_sda=1,
     keyboard_clock=1,

@@ -54,7 +54,7 @@ class Core {  // a Verilated node and its clock
             pins.adc_cos = 0;
         pins.limit_low_open = pins.limit_high_open = 0;
         pins.drive_fault_n = ALL_AXES;
-        pins.sensor_rx = pins.peer_rx = pins.link_rx = 1;
+        pins.sensor_rx = pins.peer_rx = pins.link_rx = pins.link_cs_n = 1;
         set_peripheral_pins(pins, PERIPHERAL_SENSE_IDLE);
         pins.rst = 1;
         model_->eval();

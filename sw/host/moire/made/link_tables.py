@@ -23,6 +23,8 @@ REPLY_FRAME_WORDS = 7
 LONGEST_WORDS = 128
 MOST_VALUES = 121
 UDP_PORT = 27181
+SPI_TURNROUND_NS = 5000
+SPI_TURNROUND_BYTE_NS = 100
 
 # why a packet is refused, in the order of its count: (name, words)
 CAUSES = (
