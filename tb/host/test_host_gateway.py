@@ -219,6 +219,30 @@ def test_a_slow_answer_is_awaited_without_a_request_of_another_client_in_between
     gateway.close()
 
 
+@pytest.mark.parametrize(
+    "knows_server, operation, fields, told",
+    [
+        (True, "identify", {}, [5]),
+        (False, "identify", {}, []),  # a client that may not know this message
+        (True, "status", {"axis": 0}, []),  # the node may be busy
+    ],
+)
+def test_a_client_that_looks_for_nodes_learns_where_nobody_is(
+    knows_server, operation, fields, told
+):
+    gateway, sent = Gateway(Rs485Bus(BusNode())), []
+    stream = SimpleNamespace(write=lambda data: sent.append(data) or True)
+    client = PacketClient(gateway, stream)
+    if knows_server:
+        client.take(cobs.speed_request(1))
+        sent.clear()
+    client.take(cobs.packet(0x25, request_body(operation, 9, **fields)))
+    gateway.serve_next()
+    found = [content for data in sent for content in cobs.PacketReader().feed(data)]
+    assert [cobs.nobody_at(content) for content in found] == told
+    gateway.close()
+
+
 def test_a_node_that_is_absent_delays_the_others_by_one_attempt_only():
     far = Rs485Bus(BusNode())
     gateway = Gateway(far)

@@ -380,3 +380,13 @@ def test_patience_is_that_of_a_slow_machine(monkeypatch, speed, answer_s, is_old
     words = bus.receive(9, 0.1)
     assert bool(words) == comes and server.asked == (answer_s > 0.1)
     assert not comes or words[0] == 0x51
+
+
+@pytest.mark.parametrize("address, waits", [(1, False), (2, True)])
+def test_nobody_is_waited_for_where_the_server_says_that_nobody_is(monkeypatch, address, waits):
+    server = SlowServer(None, 0)
+    monkeypatch.setattr(transport, "time", server)
+    bus = transport.CobsBus("COM7", open_port=lambda *_, **__: server)
+    bus.send([0x121, 1, 2, 0x111])
+    server.due = [(0, cobs.nobody(1, address))]
+    assert bus.receive(9, 0.1) == [] and (server.clock > 0) == waits

@@ -27,9 +27,10 @@ LONGEST_PACKET = 1 + 1 + LONGEST_BODY + CRC_LENGTH
 LONGEST_STUFFED = LONGEST_PACKET + 1  # a packet is shorter than 254 bytes: one byte more
 
 # address 0 is the server itself: a request for it, and its reply, whose body ends with the speed of
-# a simulated machine in thousandths of a simulated second per second, 0 where there is none
+# a simulated machine in thousandths of a simulated second per second, 0 where there is none; or its
+# message that no node has identified itself at an address
 TO_SERVER, FROM_SERVER = TO_NODE << 4, READY | FROM_NODE << 4
-SPEED_OF_SERVER, SPEED_FIELD, THOUSAND = 0, struct.Struct("<I"), 1000
+SPEED_OF_SERVER, NOBODY, SPEED_FIELD, THOUSAND = 0, 1, struct.Struct("<I"), 1000
 
 
 def unstuff(stuffed: bytes) -> bytes | None:
@@ -96,6 +97,18 @@ def speed_in(content: bytes) -> float | None:
     if body is None or len(body) != 3 + SPEED_FIELD.size:
         return None
     return SPEED_FIELD.unpack(body[3:])[0] / THOUSAND or None
+
+
+def nobody(sequence: int, address: int) -> bytes:
+    """The packet that says that no node has identified itself at an address."""
+    return packet(FROM_SERVER, bytes([sequence, NOBODY, address]))
+
+
+def nobody_at(content: bytes) -> int | None:
+    """The address in such a packet of a server; None if it is another one."""
+    body = body_of(content)
+    is_it = content[0] == FROM_SERVER and body is not None and len(body) == 3 and body[1] == NOBODY
+    return body[2] if body and is_it else None
 
 
 class PacketReader:

@@ -34,7 +34,7 @@ from typing import Protocol
 
 from moire.bus import rfc2217
 from moire.bus.arbiter import POLLS, Arbiter, Place, is_urgent, operation_of, places_of
-from moire.bus.cobs import PacketReader, address_of, body_of, packet, speed_reply
+from moire.bus.cobs import PacketReader, address_of, body_of, nobody, packet, speed_reply
 from moire.bus.exchanges import Exchanges
 from moire.bus.protocol import (
     CRC_LENGTH,
@@ -293,6 +293,7 @@ class Gateway:
         the server itself is answered at once.
         """
         if (own := speed_reply(content, self.speed)) is not None:
+            client.knows_server = True
             client.send(own)
             return
         address, body = address_of(content, TO_NODE), body_of(content)
@@ -300,7 +301,7 @@ class Gateway:
             self.refused += 1
             return
         self.forget_requests(client)
-        self.enqueue(Waiting(client, address, body, partial(client.answer, address)))
+        self.enqueue(Waiting(client, address, body, partial(client.answer, address, body)))
 
     def enqueue(self, one: Waiting) -> None:
         """Queues a request; one that stops an axis goes ahead of the others."""
@@ -372,6 +373,7 @@ class PacketClient:
 
     def __init__(self, gateway: Gateway, stream: Stream):
         self.gateway, self.stream, self.packets = gateway, stream, PacketReader()
+        self.knows_server = False  # it has asked the server itself something
 
     def __str__(self) -> str:
         return f"the {self.kind} at {self.stream.place}"
@@ -389,10 +391,14 @@ class PacketClient:
         for content in self.packets.feed(data):
             self.gateway.take_packet(self, content)
 
-    def answer(self, address: int, reply: bytes | None) -> None:
-        """Sends the reply to a request, if there is one."""
+    def answer(self, address: int, body: bytes, reply: bytes | None) -> None:
+        """Sends the reply to a request. Without one a client that looks for nodes, and has asked
+        the server itself before, learns that nobody is there; for others a node may only be busy.
+        """
         if reply is not None:
             self.send(packet(ready_byte(address, FROM_NODE), reply))
+        elif self.knows_server and operation_of(body) == "identify":
+            self.send(nobody(body[0], address))
 
     def send(self, data: bytes) -> None:
         """Sends what came from the bus."""

@@ -23,6 +23,7 @@ from moire.bus.cobs import (
     FROM_SERVER,
     LONGEST_STUFFED,
     PacketReader,
+    nobody_at,
     sealed,
     speed_in,
     speed_request,
@@ -328,7 +329,8 @@ class CobsBus(PortBus):
     """A stream of plain bytes with COBS packets.
 
     What is sent between two command bytes becomes one packet, and received packets are unpacked.
-    Where the server says that its simulated machine runs slowly, a reply has so much more time.
+    Where the server says that its simulated machine runs slowly, a reply has so much more time;
+    where it says that no node has identified itself, none.
     """
 
     handshake = False
@@ -373,7 +375,10 @@ class CobsBus(PortBus):
             if not data:
                 return False
             for content in self.packets.feed(data):
-                if content[0] == FROM_SERVER:
+                if (address := nobody_at(content)) is not None:
+                    if self.awaited == ready_byte(address, FROM_NODE):
+                        self.arrived, self.awaited = [], None
+                elif content[0] == FROM_SERVER:
                     self.said, self.has_said = speed_in(content), True
                 elif content[0] == self.awaited:
                     self.arrived, self.awaited = list(content), None
