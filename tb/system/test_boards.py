@@ -510,11 +510,15 @@ def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
     for name in ("check_tools", "write", "make_firmware", "synthesise", "pack"):
         monkeypatch.setattr(build, name, lambda *_: Path("none"))
     monkeypatch.setattr(build, "place", place)
+    monkeypatch.setattr(build, "netlist_state", lambda design, _: design.name)
     monkeypatch.setattr(figures_of_boards, "RESULTS", tmp_path)
     assert boards_failed() == failed
     monkeypatch.setattr(build, "place", no_more)  # each placement was kept
     assert boards_failed() == failed
-    monkeypatch.setattr(build, "state", lambda design: design.name)  # something has changed
+    monkeypatch.setattr(build, "state", lambda design: design.name)  # other sources, same netlist
+    assert boards_failed() == failed
+    monkeypatch.setattr(build, "state", lambda design: f"{design.name} again")
+    monkeypatch.setattr(build, "netlist_state", lambda *_: "another netlist")
     with pytest.raises(AssertionError):
         boards_failed()
 
