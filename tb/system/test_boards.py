@@ -517,7 +517,7 @@ def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
     assert boards_failed() == failed
     monkeypatch.setattr(build, "state", lambda design: design.name)  # other sources, same netlist
     assert boards_failed() == failed
-    monkeypatch.setattr(build, "state", lambda design: f"{design.name} again")
+    monkeypatch.setattr(build, "state", lambda design: f"again-{design.name}")
     monkeypatch.setattr(build, "netlist_state", lambda *_: "another netlist")
     with pytest.raises(AssertionError):
         boards_failed()
