@@ -103,7 +103,8 @@ def test_the_same_work_is_done_through_every_entrance(served, entrance, parity):
             and node.axes[0].enabled
             and node.parameter("velocity") == 8750
         )
-    assert node.counters["frames_bad"] == 0
+        # before the client leaves, since the gateway then speaks to the node in its own thread
+        assert node.counters["frames_bad"] == 0
 
 
 def test_auto_uses_nine_bits_over_rfc2217_and_packets_elsewhere(served):
