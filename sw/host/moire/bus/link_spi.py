@@ -11,10 +11,9 @@ import ctypes
 import fcntl
 import os
 import struct
-from types import TracebackType
-from typing import Self
 
 from moire.bus.link import Link
+from moire.closing import Closing
 from moire.errors import OutOfRange, PortError
 from moire.made import link_tables as layout
 
@@ -51,7 +50,7 @@ def reply_in(received: bytes, link: Link) -> bytes:
     return received.lstrip(b"\0")[: reply_bytes(link)]
 
 
-class SpiDevice:
+class SpiDevice(Closing):
     """An SPI device of Linux. PortError says why it cannot be used."""
 
     def __init__(self, device: str, hz: int) -> None:
@@ -73,17 +72,6 @@ class SpiDevice:
         except OSError:
             self.close()
             raise PortError(f"{device} is no SPI device, or it has no mode {MODE}") from None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Closes the device."""

@@ -16,8 +16,7 @@ import errno
 import os
 import time
 from collections.abc import Callable, Iterable, Sequence
-from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 from moire.bus.cobs import (
     FROM_SERVER,
@@ -30,6 +29,7 @@ from moire.bus.cobs import (
 )
 from moire.bus.protocol import FROM_NODE, NINTH, ODD_ADDRESSES, TO_NODE, ready_byte
 from moire.bus.twin_port import machine_of, open_twin
+from moire.closing import Closing
 from moire.errors import PortError
 
 try:
@@ -56,7 +56,7 @@ Result = TypeVar("Result")
 Key = TypeVar("Key")
 
 
-class Transport(abc.ABC):
+class Transport(Closing):
     """Sends and receives words from 0 to 511; bit 8 is the 9th bit.
 
     `character_s` is the time of one word. As a context manager it closes itself.
@@ -104,17 +104,6 @@ class Transport(abc.ABC):
 
     def close(self) -> None:
         """Releases the port; the transport cannot be used any more."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def open_bus(

@@ -10,8 +10,7 @@ import json
 import socket
 import ssl
 from collections import deque
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 from urllib.parse import urlencode, urlsplit
 
 from wsproto import ConnectionType, WSConnection
@@ -26,6 +25,7 @@ from wsproto.events import (
     Request,
 )
 
+from moire.closing import Closing
 from moire.errors import MoireError, PortError
 
 RECEIVE = 65536
@@ -39,7 +39,7 @@ class ServerRefused(MoireError):
         self.status, self.cause, self.error = status, error.get("cause"), error
 
 
-class StreamClient:
+class StreamClient(Closing):
     """One WebSocket. `fields` are those of a stream: axes, every, only; and token."""
 
     def __init__(self, url: str, timeout_s: float | None = None, **fields: str):
@@ -148,14 +148,3 @@ class StreamClient:
     def close(self) -> None:
         """Ends the connection."""
         self.socket.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
