@@ -59,7 +59,7 @@ COUNTERS = (
 ENGINE = r"u_engine__DOT__(?!u_settings)\w+|result|result_\w+"
 AXES = (
     r"u_position__\w+|u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|plain_phase|age|due|"
-    r"scale_valid|stepped|counted|strobe"
+    r"scale_valid|stepped|counted|strobe|step_made_q|passed"
 )
 SINE = r"u_chain__\w+|u_monitor__\w+|u_adc__\w+|u_recorder__\w+|raw_sin|raw_cos"
 ADC = re.compile(r"__DOT__u_adc__")  # in a node with a sine axis
