@@ -34,6 +34,7 @@ from boards.generate import files, placeholder
 from boards.machine import Machine
 from boards.size import firmware_stem
 from boards.toml_file import ROOT, Misfit, TooLarge, shown
+from figures import synthesis
 from figures.synthesis import SynthesisError, placed, run, yosys
 from firmware import build as firmware
 
@@ -222,7 +223,9 @@ def state(design: Design) -> str:
     here = Path(__file__)
     sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", here]
     sources += [here.with_name(name) for name in ("family.py", "gowin.lock")]
-    found = hashlib.sha256()
+    sources.append(Path(synthesis.__file__))
+    part = design.board.part
+    found = hashlib.sha256(repr((part.synthesis, part.place)).encode())
     for path in sources:
         found.update(path.name.encode() + path.read_bytes())
     for name, text in files(design).items():

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The figure of the boards places a design again only if nextpnr would see something new."""
 
+from dataclasses import replace
+
 import pytest
 
 from boards import board, build, machine
@@ -33,6 +35,15 @@ def test_a_netlist_is_another_if_a_cell_is_but_not_if_lines_or_numbers_are(desig
 def test_another_pin_or_board_is_another_placement(design):
     other = fit(board.named("colorlight_i9"), machine.named("mill"))
     assert build.told(other) != build.told(design)
+
+
+@pytest.mark.parametrize(
+    "option", [{"synthesis": "-nowidelut"}, {"place": ["--router", "router1"]}]
+)
+def test_another_option_of_a_tool_is_another_placement(design, option):
+    part = replace(design.board.part, **option)
+    other = replace(design, board=replace(design.board, part=part))
+    assert build.state(other) != build.state(design)
 
 
 def test_a_design_is_synthesised_again_only_if_its_sources_have_changed(
