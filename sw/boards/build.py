@@ -13,6 +13,7 @@ python -m boards.build --board x --machine y [--only-files | --firmware]
 
 import argparse
 import hashlib
+import inspect
 import json
 import re
 import shutil
@@ -34,7 +35,6 @@ from boards.generate import files, placeholder
 from boards.machine import Machine
 from boards.size import firmware_stem
 from boards.toml_file import ROOT, Misfit, TooLarge, shown
-from figures import synthesis
 from figures.synthesis import SynthesisError, placed, run, yosys
 from firmware import build as firmware
 
@@ -223,9 +223,8 @@ def state(design: Design) -> str:
     here = Path(__file__)
     sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", here]
     sources += [here.with_name(name) for name in ("family.py", "gowin.lock")]
-    sources.append(Path(synthesis.__file__))
-    part = design.board.part
-    found = hashlib.sha256(repr((part.synthesis, part.place)).encode())
+    sources.append(Path(inspect.getfile(yosys)))
+    found = hashlib.sha256((design.board.part.synthesis + told(design)).encode())
     for path in sources:
         found.update(path.name.encode() + path.read_bytes())
     for name, text in files(design).items():
