@@ -179,9 +179,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         passed.append(report(outcome, figures[outcome.name], quick))
     if not quick:
         conclude(outcomes, names, recorded=seed in (None, 1) and not options.unrecorded)
-    console.print(f"{sum(passed)} of {len(passed)} pass" if len(names) > 1 else "")
     failed = [one for one, passes in zip(outcomes, passed) if not passes]
+    console.print(summary(len(outcomes), failed) if len(names) > 1 else "")
     return 1 if [one for one in failed if not (one.absent and options.all)] else 0
+
+
+def summary(number: int, failed: Sequence[Outcome]) -> str:
+    """The last line of several figures: how many pass, and the names of those that do not."""
+    absent = [one.name for one in failed if one.absent]
+    missed = [one.name for one in failed if not one.absent]
+    parts = [f"{number - len(failed)} of {number} pass"]
+    parts += [f"not measured: {', '.join(absent)}"] if absent else []
+    parts += [f"failed: {', '.join(missed)}"] if missed else []
+    return "; ".join(parts)
 
 
 if __name__ == "__main__":

@@ -136,7 +136,10 @@ def test_a_figure_whose_program_is_absent_is_not_measured_and_does_not_fail_all_
         "fixed" not in (start := (tmp_path / "index.html").read_text()) and "figures.html" in start
     )
     figures["fixed"] = Figure(lambda: 3.0, "nm", "a fixed one", "2", Quick(), 1)
+    capsys.readouterr()
     assert command.main(["--all"]) == 1
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert last == "0 of 2 pass; not measured: drawn; failed: fixed"
 
 
 def test_the_record_holds_figures_of_today_with_their_units_and_bounds():
