@@ -76,12 +76,12 @@ module event_filter #(
         wire                    differs = level[i] ^ filtered[i];
         wire                    ripe = &(seen | ~last);
         wire                    over = &(against | ~tolerated);
-        wire                    ends = sample && active[i] && (differs ? ripe : over);
+        wire                    ends = sample && (differs ? ripe : over);
 
         assign active[i] = differs || seen != '0;
 
         always_ff @(posedge clk) begin
-            rejected[i] <= !settling && ends && !differs;
+            rejected[i] <= !settling && ends && !differs && seen != '0;
             if (settling || (ends && differs)) filtered[i] <= level[i];
             if (sample && differs) seen <= seen + 1'b1;
             if (sample && !differs && active[i]) against <= against + 1'b1;
