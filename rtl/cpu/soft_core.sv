@@ -37,8 +37,9 @@ module soft_core #(
     input  wire         ready,    // level: the registers take an access in the next cycle
     output logic        select,   // strobe: one access to the registers
     output logic        write,    // level: with select, wdata is to be written
-    output logic [15:0] address,  // byte address of a register, from 1 cycle before select on
-    output logic [31:0] wdata,    // word to be written, from 1 cycle before select on
+    // from 1 cycle before select on; 0 while the core accesses no register
+    output logic [15:0] address,  // byte address of a register
+    output logic [31:0] wdata,    // word to be written
     input  wire  [31:0] rdata,    // word read, 2 cycles after select
     output logic        trap      // level: the core has stopped
 );
@@ -83,9 +84,10 @@ module soft_core #(
     wire mem_ready = answered || memory_ready;
 
     assign request = mem_valid && in_registers && !(select || awaited || answered);
-    assign write   = mem_wstrb[0];
-    assign address = mem_addr[15:0];
-    assign wdata   = mem_wdata;
+    // the bus is quiet meanwhile, so that the twin need not evaluate the registers
+    assign write   = mem_wstrb[0] && mem_addr[31];
+    assign address = mem_addr[15:0] & {16{mem_addr[31]}};
+    assign wdata   = mem_wdata & {32{mem_addr[31]}};
     assign trap    = core_trap || lost;
 
     always_ff @(posedge clk) begin

@@ -8,10 +8,11 @@ only one branch of a condition needs is computed in this branch. The registers, 
 after each edge are the same, bit for bit; tb/twin/test_rising_edge.py compares them. Reset is left
 to Verilator's evaluation: in the function it is low.
 
-While the soft core waits, most of the node rests: its registers stay as they are until one of its
-inputs changes. Such an edge evaluates only the other part; and of this part, only what is left
-while the axes stand still, and while the motion engine waits for the next tick. Which part works is
-a list of names; a wrong list costs time, but the result is the same.
+While the soft core accesses no register, most of the node rests: its registers stay as they are
+until one of its inputs changes. Such an edge evaluates only the other part; and of this part, only
+what is left while the soft core waits, while the axes stand still, and while the motion engine
+waits for the next tick. Which part works is a list of names; a wrong list costs time, but the
+result is the same.
 
 Everything here works on the text that `verilator --no-decoration` makes; twin/statements.py takes
 it apart.
@@ -46,16 +47,20 @@ CALL = re.compile(rf"{ROOT}___(\w+)\(vlSelf\);")
 RESET = re.compile(r"\(IData\)\(vlSelfRef\.rst\)|vlSelfRef\.rst\b")
 PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
 CORE = "vlSelfRef.node__DOT__g_core__DOT__u_core__DOT__"
-WAITS = f"vlSelfRef.node__DOT__core_waits & {CORE}mem_valid & {CORE}mem_addr >> 31"
+ACCESSES = f"{CORE}mem_valid & {CORE}mem_addr >> 31"  # a register; it may wait for it
+WAITS = f"vlSelfRef.node__DOT__core_waits & {ACCESSES}"
+ALWAYS = "1U"
 SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
-# What may change while the soft core waits: counters in any case; the motion engine until there is
-# nothing to do for it; the axes while they move, and for some cycles of each sample; the way of a
-# sample from a converter to the position. A register that is missing here costs time only;
-# tb/twin/test_rising_edge.py sees it.
+# What may change while the soft core accesses no register: counters in any case; the core itself;
+# the motion engine until there is nothing to do for it; the axes while they move, and for some
+# cycles of each sample; the way of a sample from a converter to the position. A register that is
+# missing here costs time only; tb/twin/test_rising_edge.py sees it.
 COUNTERS = (
     r"u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|u_core_wait__\w+|u_engine__DOT__elapsed|"
     r"u_lines__\w+|u_filter__DOT__(?:skipped|due)|since"
 )
+SOFT_CORE = r"u_core__\w+"
+SELDOM = re.compile(r"__DOT__master_(?:address|wdata)$")  # they are 0 but for an access of the core
 ENGINE = r"u_engine__DOT__(?!u_settings)\w+|result|result_\w+"
 AXES = (
     r"u_position__\w+|u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|plain_phase|age|due|"
@@ -67,7 +72,7 @@ FETCHED = re.compile(r"__DOT__u_sequencer__DOT__next_line$")  # it stays while t
 
 
 def works(*names: str) -> re.Pattern[str]:
-    """The registers that change although the soft core waits: counters, and those of these
+    """The registers that change although the soft core accesses none: counters, and those of these
     names.
     """
     return re.compile(rf"^(?:node__DOT__)?now$|(?:^|__DOT__)(?:{'|'.join((COUNTERS, *names))})$")
@@ -233,12 +238,14 @@ class Rest:
                 ):
                     self.works |= set(unit)
                     changes -= self.state
-                    active |= {name for name in changes if not self.is_bit(name)}
+                    active |= {name for name in changes if not self.is_quiet(name)}
 
-    def is_bit(self, name: str) -> bool:
-        """Whether a signal is a single bit, which seldom changes although others do."""
+    def is_quiet(self, name: str) -> bool:
+        """Whether a signal seldom changes although others do: a single bit, and the register bus of
+        the soft core.
+        """
         types = {**self.design.types, **self.design.locals}
-        return types.get(name, "") == "CData/*0:0*/"
+        return types.get(name, "") == "CData/*0:0*/" or bool(SELDOM.search(name))
 
     def units(self) -> Iterator[list[int]]:
         """The statements by what they change: two that change the same are in the same unit."""
@@ -482,14 +489,18 @@ def function(design: Design) -> str:
     if late := effect_of(program).needs & design.of_inputs:
         raise FormError(f"logic of inputs stays behind: {', '.join(sorted(late))}")
     serial = any(name.startswith(SERIAL_CORE) for name in design.types)
-    waits = NEVER if serial else WAITS
+    waits, accesses = (NEVER, ALWAYS) if serial else (WAITS, ACCESSES)
     if missing := set(re.findall(r"node__\w+", waits)) - set(design.types):
         raise FormError(f"there is no {', '.join(sorted(missing))}")
     fetched = [name for name in design.types if FETCHED.search(name)]
     if any(ADC.search(name) for name in design.types):
-        active = [works(ENGINE, AXES, SINE), works(AXES, SINE)]
+        active = [
+            works(SOFT_CORE, ENGINE, AXES, SINE),
+            works(ENGINE, AXES, SINE),
+            works(AXES, SINE),
+        ]
     else:
-        active = [works(ENGINE, AXES), works(ENGINE), works()]
+        active = [works(SOFT_CORE, ENGINE, AXES), works(ENGINE, AXES), works(ENGINE), works()]
     if not fetched:
         active.pop()  # there is no engine
     edges = Edges(design, program, len(logic), active)
@@ -514,12 +525,20 @@ def function(design: Design) -> str:
                 *edges.observed(number),
                 "}",
             ]
+        elif number == 1:
+            lines += [
+                f"if (!({waits})) {{",
+                "if (edge_1(vlSelfRef, rest)) return;",
+                "} else {",
+                *edges.observed(number),
+                "}",
+            ]
         else:
             lines += edges.observed(number)
         lines.append("}")
     lines += [
         "rest.known_0 = false;",
-        f"if (!({waits})) {{",
+        f"if (({accesses}) & !({waits})) {{",
         "edge_0(vlSelfRef, rest);",
         "return;",
         "}",
