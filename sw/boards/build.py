@@ -264,7 +264,7 @@ class Note:
 
     placement: str = ""  # its state
     seed: str = ""
-    program: str = ""  # hash of the firmware in the bitstream
+    packing: str = ""  # hash of what the bitstream was made of beside the placement
 
     @classmethod
     def read(cls, folder: Path) -> "Note":
@@ -273,14 +273,16 @@ class Note:
         return cls(*lines[:3])
 
     def write(self, folder: Path) -> None:
-        (folder / NOTE).write_text(f"{self.placement} {self.seed} {self.program}\n")
+        (folder / NOTE).write_text(f"{self.placement} {self.seed} {self.packing}\n")
 
 
-def program_hash(design: Design, folder: Path) -> str:
-    """A hash of the firmware; `none` for a relay."""
-    if not design.machine.image:
-        return "none"
-    return hashlib.sha256(program_of(design, folder).read_bytes()).hexdigest()
+def packing_hash(design: Design, folder: Path) -> str:
+    """A hash of what a bitstream is made of beside the placement: the options of the packer, and
+    the firmware, which a relay does not have.
+    """
+    program = program_of(design, folder).read_bytes() if design.machine.image else b""
+    options = placer(design).pack(design.board.part, Path(PLACED), Path())
+    return hashlib.sha256(repr(options).encode() + program).hexdigest()
 
 
 def placed_again(design: Design, folder: Path, seed: int, say: Callable[[str], None]) -> None:
@@ -300,13 +302,13 @@ def placed_again(design: Design, folder: Path, seed: int, say: Callable[[str], N
 
 def packed(design: Design, folder: Path, placement: Note, say: Callable[[str], None]) -> Path:
     """The bitstream of a placement with the firmware that is there; it is made again only if the
-    firmware is another one.
+    firmware or an option of the packer is another one.
     """
-    made, now = folder / design.board.part.family.bitstream, program_hash(design, folder)
-    if placement.program != now or not made.is_file():
+    made, now = folder / design.board.part.family.bitstream, packing_hash(design, folder)
+    if placement.packing != now or not made.is_file():
         say(f"--- {design.name}: bitstream")
         pack(design, folder)
-        replace(placement, program=now).write(folder)
+        replace(placement, packing=now).write(folder)
     return made
 
 

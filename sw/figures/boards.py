@@ -15,7 +15,7 @@ from boards.fit import Design, fit
 from boards.generate import files
 from boards.toml_file import Misfit
 from figures.common import Figure, Quick, console, seeds
-from figures.synthesis import PLACEMENTS, SynthesisError
+from figures.synthesis import PLACEMENTS, NotEndedError, SynthesisError
 
 SMALL = ("counter_box", "relay")  # machines on an iCEBreaker
 RESULTS = build.OUT / "results"  # of placements that are done
@@ -40,13 +40,15 @@ def netlist_state(design: Design, synthesise: Callable[[], Path]) -> str:
 def once(design: Design, seed: int, state: str, measure: Callable[[], float]) -> float:
     """What is measured of a design with a seed, or what it was before if nothing has changed that
     nextpnr sees; so the hours of the figure may be divided into sittings. A tool that failed is a
-    result, too.
+    result, too, but one that did not end in time is none.
     """
     file = RESULTS / f"{design.name}-seed{seed}-{state[:16]}.json"
     if not file.is_file():
         found: dict[str, float | str] = {}
         try:
             found["mhz"] = measure()
+        except NotEndedError:
+            raise
         except SynthesisError as why:
             found["why"] = str(why)
         file.write_text(json.dumps(found))

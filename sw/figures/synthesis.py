@@ -44,6 +44,10 @@ class SynthesisError(Exception):
     """One line that says which step failed and why."""
 
 
+class NotEndedError(SynthesisError):
+    """A step took too long; it might have ended on a faster computer."""
+
+
 def run(command: Sequence[object], step: str, log: Path) -> None:
     """Run a tool in the root directory. Built files are named by relative paths, since a YoWASP
     tool has a /tmp of its own.
@@ -60,7 +64,7 @@ def run(command: Sequence[object], step: str, log: Path) -> None:
             )
         except subprocess.TimeoutExpired:
             name, minutes = log.relative_to(ROOT), LONGEST_S // 60
-            raise SynthesisError(
+            raise NotEndedError(
                 f"{step} has not ended after {minutes} minutes: try another seed (log: {name})"
             ) from None
     if done.returncode:

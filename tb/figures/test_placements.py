@@ -8,7 +8,7 @@ import pytest
 from boards import board, build, machine
 from boards.fit import fit
 from figures import boards
-from figures.synthesis import SynthesisError
+from figures.synthesis import NotEndedError, SynthesisError
 
 NETLIST = """{"cells": {"$auto$rtl/axis.sv:%d$%d": {"type": "LUT4", "parameters": {"INIT": "%s"},
 "attributes": {"module_src": "rtl/node.sv:%d.1", "src": "rtl/axis.sv:%d.1"}, "connections": {}}}}"""
@@ -79,3 +79,14 @@ def test_a_tool_that_failed_is_a_result_too(design):
     for measure in (fails, lambda: 51.5):
         with pytest.raises(SynthesisError, match="no way through"):
             boards.once(design, 1, "a", measure)
+
+
+def test_a_tool_that_did_not_end_in_time_is_run_again(design):
+    boards.RESULTS.mkdir()
+
+    def takes_long():
+        raise NotEndedError("place and route has not ended after 180 minutes")
+
+    with pytest.raises(NotEndedError):
+        boards.once(design, 1, "a", takes_long)
+    assert boards.once(design, 1, "a", lambda: 51.5) == 51.5

@@ -8,6 +8,7 @@ import json
 import random
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -351,6 +352,16 @@ def test_new_firmware_alone_is_packed_and_not_placed(calls):
     assert not calls[5:], "nothing has changed"
     build.bitstream(one, 3, quiet)
     assert calls[5:] == ["synthesis", "place 3", "pack"]
+
+
+def test_another_option_of_the_packer_makes_another_bitstream_of_the_same_placement(calls):
+    calls.pop()
+    one = design("colorlight_i5")
+    build.bitstream(one, 2, quiet)
+    part = replace(one.board.part, pack=["--compress"])
+    other = replace(one, board=replace(one.board, part=part))
+    build.bitstream(other, 2, quiet)
+    assert calls == ["synthesis", "place 2", "pack", "pack"]
 
 
 def test_the_firmware_of_a_serial_core_is_appended_without_a_placement(calls):
