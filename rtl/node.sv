@@ -51,6 +51,7 @@ module node #(
     parameter int SCOPE_WORDS = 0,  // words of the recorder of ticks; 0: none, and no excitation
     parameter int HAS_LINK = 0,  // 1: build the real-time link
     parameter int LINK_CARRIER = 0,  // of the link, 0: serial line, 1: UDP datagrams, 2: SPI
+    parameter int LINK_PLL = 0,  // 1: build its PLL, which captures the feedback before a request
     parameter int HAS_SERIAL_CORE = 0,  // 1: bit-serial soft core, with its firmware in a flash
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
     parameter FIRMWARE = "",  // file of its contents at power-up
@@ -652,7 +653,8 @@ module node #(
     link_port #(
         .CLK_HZ (CLK_HZ),
         .BUILT  (HAS_LINK),
-        .CARRIER(LINK_CARRIER)
+        .CARRIER(LINK_CARRIER),
+        .PLL    (LINK_PLL)
     ) u_link (
         .clk,
         .rst,

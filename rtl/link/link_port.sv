@@ -15,7 +15,8 @@
 module link_port #(
     parameter int CLK_HZ  = 60_000_000,  // Hz, clk frequency; a multiple of 1000
     parameter int BUILT   = 1,           // 0: no logic, all outputs are idle
-    parameter int CARRIER = 0            // 0: serial line, 1: UDP datagrams, 2: SPI
+    parameter int CARRIER = 0,           // 0: serial line, 1: UDP datagrams, 2: SPI
+    parameter int PLL     = 0            // 1: build the PLL of the arrivals
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -93,16 +94,21 @@ module link_port #(
         wire [6:0] lists_writes, lists_reads, entry_number;
         wire [15:0] entry_write, entry_read, watchdog_time;
         wire [19:0] bit_time;
+        wire [19:0] pll_period;
+        wire [18:0] capture_lead;
         wire entry_written, enable;
         // state
         wire [47:0] refused;
-        wire busy, framing_errors;
+        wire [20:0] phase_error;
+        wire [31:0] read_at;
+        wire busy, locked, capturing, framing_errors;
         // packets
         wire rx_valid, rx_ends, rx_broken, rx_foreign, accepted, tx_valid, tx_last, tx_taken;
         wire [7:0] rx_data, tx_data;
 
         process_link #(
-            .CLK_HZ(CLK_HZ)
+            .CLK_HZ(CLK_HZ),
+            .PLL   (PLL)
         ) u_link (
             .clk,
             .rst,
@@ -114,6 +120,8 @@ module link_port #(
             .reads      (lists_reads),
             .time_window,
             .watchdog_ms(watchdog_time),
+            .pll_period,
+            .capture_lead,
             .list_put   (entry_written),
             .list_at    (entry_number),
             .list_entry ({entry_read, entry_write}),
@@ -121,6 +129,10 @@ module link_port #(
             .busy,
             .refused,
             .expired    (watchdog_expired),
+            .locked,
+            .phase_error,
+            .capturing,
+            .read_at,
             // packets
             .rx_valid,
             .rx_data,
@@ -315,6 +327,8 @@ module link_port #(
             .watchdog_time,
             .bit_time,
             .enable,
+            .pll_period,
+            .capture_lead,
             // state
             .state_built            (1'b1),
             .state_on               (enable),
@@ -327,7 +341,12 @@ module link_port #(
             .refused_replayed       (refused[31:24]),
             .refused_now_out_of_time(refused[39:32]),
             .refused_now_busy       (refused[47:40]),
-            .framing_errors
+            .framing_errors,
+            .pll_state_built        (1'(PLL != 0)),
+            .pll_state_locked       (locked),
+            .pll_state_captured     (capturing),
+            .pll_state_phase_error  ({{3{phase_error[20]}}, phase_error}),
+            .read_time              (read_at)
         );
     end
 endmodule

@@ -4,23 +4,30 @@
 //
 // latency   1 cycle from start to the first step; 7 cycles for each register while ready is high,
 //           2 cycles for each word of the head of the reply, 6 cycles for four bytes of the reply
-//           while taken is high, and 1 cycle after each of the six phases
+//           while taken is high, and 1 cycle after each of the six phases; 1 cycle from capture to
+//           the first step of the reading, while no request is played or answered
 // rate      one request at a time: start is ignored while busy is high
 // behaviour The values of the request are written to the registers of the write list, in order.
 //           Then the time is taken, the registers of the read list are read, in order, and the
 //           spare access follows. The reply is sent only after that, from a memory of its own.
 //           Entry n of the lists has the address of write n in bits 15:0 and that of read n in bits
-//           31:16; it is stored while enable and busy are low.
+//           31:16; it is stored while enable and busy are low and no capture is made.
+//           With CAPTURES the registers of the read list are read at `capture` too, and while
+//           `hold` is high a reply carries the values of the last capture instead of reading. A
+//           request that comes during a capture waits for its end; a capture that comes during a
+//           request, too.
 // limits    writes and reads up to 122; they change only while enable and busy are low
 // source    tables/link.toml: the layout of a packet
 // model     tb/link/packet_player.py, equal in every bit of every cycle
-// proved    The register bus gets no access unless a request is being played. Bytes are sent only
-//           while a request is being answered, each stays until it is taken, and last comes only
-//           with the last byte of the CRC-32.
-// proof     depth 10
+// proved    The register bus gets no access unless a request is being played or a capture is made,
+//           and a capture only reads. Bytes are sent only while a request is being answered, each
+//           stays until it is taken, and last comes only with the last byte of the CRC-32.
+// proof     depth 10, CAPTURES = 1
 `default_nettype none
 
-module packet_player (
+module packet_player #(
+    parameter int CAPTURES = 0  // 1: the read list can be read before a request
+) (
     input  wire         clk,
     input  wire         rst,
     // settings
@@ -37,6 +44,11 @@ module packet_player (
     input  wire  [31:0] word,        // word of a request
     input  wire         start,       // strobe: the request in the bank is to be played
     output logic        busy,        // level: a request is being played or answered
+    // captures
+    input  wire         capture,     // strobe: read the registers of the read list
+    input  wire         hold,        // level: replies carry the last capture
+    output logic        capturing,   // level: they are being read for a capture
+    output logic [31:0] read_at,     // cycles, time at which the last reading began; 0 without
     // for the reply
     input  wire  [31:0] now,         // cycles, time of the node
     input  wire  [47:0] refused,     // counts of refused packets
@@ -96,6 +108,8 @@ module packet_player (
     logic   [ 1:0] number;  // of the byte
     logic [31:0] fetched, reply_word;  // what the memories have read
     logic free, done;
+    logic captured;  // the memory of the reply has the values of a capture
+    logic captures, plays;  // levels: what begins if the player is idle
     wire  [31:0] crc;
 
     // words of the phase
@@ -118,7 +132,7 @@ module packet_player (
     wire [6:0] value_at = index[6:0] + (phase == HEAD ? 7'd0 : 7'(REQUEST_WORDS));
     wire [8:0] request_at = {1'b0, !bank, phase == SPARE ? spare_at : value_at};
     wire [8:0] fetch_at = from_list ? {2'b10, index[6:0]} : request_at;
-    wire       list_stored = list_put && !enable && !busy;
+    wire       list_stored = list_put && !enable && !busy && !capturing;
 
     always_ff @(posedge clk) begin
         if (put || list_stored)
@@ -185,7 +199,36 @@ module packet_player (
     wire        ends = index == words;
     wire        sent = valid && taken && number == 2'd3;
 
-    assign busy  = state != IDLE;
+    if (CAPTURES != 0) begin : g_captures
+        logic due, waiting;  // what could not begin yet
+
+        assign captures = capture || due;
+        assign plays    = start || waiting;
+        assign busy     = (state != IDLE && !capturing) || waiting;
+
+        always_ff @(posedge clk) begin
+            due     <= hold && captures && state != IDLE;
+            waiting <= (waiting || (start && !busy)) && (state != IDLE || captures);
+            if (state == IDLE) capturing <= captures;
+            else if (state == FETCH && ends && phase == READS) capturing <= 1'b0;
+            captured <= hold && (captured || (capturing && state == FETCH && ends));
+            if (state == FETCH && phase == READS && index == '0) read_at <= now;
+            if (rst) begin
+                due       <= 1'b0;
+                waiting   <= 1'b0;
+                capturing <= 1'b0;
+                captured  <= 1'b0;
+            end
+        end
+    end else begin : g_no_captures
+        assign {captures, capturing, captured} = '0;
+        assign plays   = start;
+        assign busy    = state != IDLE;
+        assign read_at = '0;
+
+        wire unused_capture = &{1'b0, capture, hold};
+    end
+
     assign valid = state == BYTES;
     assign data  = sent_word[8*number+:8];
     assign last  = valid && phase == SEAL && number == 2'd3;
@@ -193,15 +236,15 @@ module packet_player (
     always_ff @(posedge clk) begin
         case (state)
             IDLE: begin
-                phase <= WRITES;
+                phase <= captures ? READS : WRITES;
                 index <= '0;
-                if (start) state <= FETCH;
+                if (captures || plays) state <= FETCH;
             end
             FETCH:
             if (ends) begin
                 index <= '0;
-                phase <= phase + 3'd1;
-                if (phase == SEAL) state <= IDLE;
+                phase <= phase == HEAD && captured ? SPARE : phase + 3'd1;
+                if (phase == SEAL || capturing) state <= IDLE;
             end else state <= VALUE;
             VALUE: begin
                 at      <= phase == READS ? fetched[31:16] : fetched[15:0];
@@ -240,7 +283,8 @@ module packet_player (
         assume (writes <= 7'd122 && reads <= 7'd122);
         if (past && !$past(rst)) begin
             assert (state <= BYTES);
-            if (busy) assert (phase <= SEAL);
+            if (state != IDLE) assert (phase <= SEAL && (busy || capturing));
+            if (capturing) assert (state != IDLE && phase == READS);
             assert (free == (state != ANSWER));
             // an access waits, is made, or is being answered
             assert (32'(!free) == 32'(request) + 32'(select) + 32'($past(select)) + 32'(done));
@@ -256,6 +300,7 @@ module packet_player (
             if (last) assert (valid && phase == SEAL);
             cover (select && write);
             cover (state == VALUE && phase == HEAD);
+            cover (capturing && select);
         end
     end
 `endif

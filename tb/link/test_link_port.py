@@ -16,6 +16,7 @@ from moire.bus.link import Link, Spare
 from moire.bus.link_spi import reply_bytes, reply_in
 from moire.made.registers import FIELDS
 from tb.bench import needs, run, start
+from tb.link.link_pll import FULL
 from tb.serial.uart_rx import UartRx, character, line
 
 SESSION = 0x00BEEF
@@ -325,6 +326,34 @@ async def damaged_and_cut_spi_transfers_are_counted_and_the_next_request_is_answ
     assert (await port.read("refused")) == dict(damaged=6, foreign=0, wrong_length=0, replayed=1)
 
 
-@pytest.mark.parametrize("built, carrier", [(1, 0), (1, 1), (1, 2), (0, 0)])
-def test_link_port(built, carrier):
-    run("link_port", __file__, CLK_HZ=CLK_HZ, BUILT=built, CARRIER=carrier)
+@cocotb.test()
+async def requests_are_followed_and_the_registers_of_the_pll_show_it(dut):
+    has_datagrams(dut)
+    port, built = await begin(dut), int(dut.PLL.value)
+    nothing = dict(built=built, locked=0, captured=0, phase_error=0)
+    assert await port.read("pll_state") == nothing
+    assert await port.read("read_time") == dict(value=0) or built
+    await port.write("pll_period", value=2048)
+    await port.write("capture_lead", value=300)
+    host, late = await port.set_up(), -30
+    for n in range(FULL + 3):
+        while port.now % 2048 != (late if n == FULL + 2 else 0) % 2048:
+            await port.clk()
+        begun = port.now
+        _, content = await port.datagram(host.request(0, [n, 7]))
+        assert host.reply(content).values == (0x411, 0x415)
+        assert (await port.read("pll_state"))["locked"] == int(built and n > FULL)
+    assert (await port.read("pll_state"))["phase_error"] == built * late
+    read = (await port.read("read_time"))["value"]
+    expected = begun - late + len(host.request(0, [0, 0]))
+    assert read == 0 or abs(expected - 300 - read) < 10
+    assert bool(read) == bool(built)
+    await port.write("enable", value=0)
+    assert await port.read("pll_state") == nothing
+
+
+@pytest.mark.parametrize(
+    "built, carrier, pll", [(1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 2, 0), (0, 0, 0), (0, 0, 1)]
+)
+def test_link_port(built, carrier, pll):
+    run("link_port", __file__, CLK_HZ=CLK_HZ, BUILT=built, CARRIER=carrier, PLL=pll)

@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """process_link: requests of the host's codec in, accesses and replies out, with a request arriving
-while the last one is answered, and the watchdog. Its blocks' models run beside it in every cycle.
+while the last one is answered, the watchdog, and captures before requests that are expected. Its
+blocks' models run beside it in every cycle.
 """
 
 import random
 
 import cocotb
+import pytest
 from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 
 from moire.bus.link import Link, Spare
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.interlock.heartbeat_watchdog import HeartbeatWatchdog
+from tb.link.link_pll import FULL, LinkPll
 from tb.link.packet_player import PacketPlayer
 from tb.link.packet_receiver import PacketReceiver
 
 SESSION = 0x00BEEF
 CLK_HZ = 1_000_000
-NAMES = ("busy", "request", "select", "write", "address", "wdata", "tx_valid", "tx_data", "tx_last")
+NAMES = ("busy", "capturing", "request", "select", "write", "address", "wdata")
+NAMES += ("tx_valid", "tx_data", "tx_last", "read_at")
+PERIOD, LEAD = 2048, 300  # cycles
 INPUTS = {
     "enable": 0,
     "session": SESSION,
@@ -24,6 +29,8 @@ INPUTS = {
     "reads": 2,
     "time_window": 1000,
     "watchdog_ms": 2,
+    "pll_period": PERIOD,
+    "capture_lead": LEAD,
     "list_put": 0,
     "list_at": 0,
     "list_entry": 0,
@@ -45,7 +52,8 @@ class Node:
 
     def __init__(self, dut):
         self.dut, self.levels, self.cycles = dut, dict(INPUTS), 0
-        self.receiver, self.player = PacketReceiver(), PacketPlayer()
+        self.has_pll, self.pll = int(dut.PLL.value), LinkPll()
+        self.receiver, self.player = PacketReceiver(), PacketPlayer(self.has_pll)
         self.watchdog, self.expired = HeartbeatWatchdog(CLK_HZ), 0
         self.registers, self.answers, self.replies = {}, [0, 0], [bytearray()]
 
@@ -59,7 +67,9 @@ class Node:
         traffic = {"enable": enable, "valid": inputs["rx_valid"], "data": inputs["rx_data"]}
         accepted, bank, refused, put, put_at, word = self.receiver.outputs(**traffic)
         want = dict(zip(NAMES, self.player.outputs(), strict=True))
+        locked, phase_error, capture = self.pll.outputs() if self.has_pll else (0, 0, 0)
         others = {"refused": refused, "expired": self.expired, "accepted": accepted}
+        others |= {"locked": locked, "phase_error": phase_error}
         for name, level in (want | others).items():
             if level is not None and self.cycles:
                 got = int(getattr(self.dut, name).value)
@@ -99,8 +109,11 @@ class Node:
             refused=refused,
             expired=self.expired,
             now=now,
+            capture=capture,
+            hold=locked,
             rst=rst,
         )
+        self.pll.step(enable, inputs["pll_period"], inputs["capture_lead"], accepted, rst)
         self.expired = self.watchdog.clk(rst, inputs["watchdog_ms"], accepted, enable)
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
@@ -260,5 +273,34 @@ async def any_bytes_match_the_models(dut):
             await node.clk(rst=1)
 
 
-def test_process_link():
-    run("process_link", __file__, CLK_HZ=CLK_HZ)
+@cocotb.test()
+async def replies_carry_what_was_captured_before_the_request_once_the_pll_is_locked(dut):
+    needs(int(dut.PLL.value), "a link without a PLL")
+    node, host = await begin(dut)
+    node.levels["time_window"] = 0
+    for n in range(FULL + 6):
+        begun = node.levels["now"]
+        while node.levels["now"] < begun + 1000:
+            await node.clk()
+        node.registers[0x410] = 1  # what a capture finds
+        while node.levels["now"] < begun + 1300:
+            await node.clk()
+        node.registers[0x410] = 2  # what the request finds
+        await node.send(host.request(0, [1, 2]))
+        arrived = node.levels["now"]
+        reply = host.reply(await node.answered())
+        captured = n > FULL
+        assert reply.values[0] == (1 if captured else 2)
+        assert 0 < reply.time - arrived < 60
+        read = node.player.read_at - arrived
+        assert read == (1 - LEAD if captured else reply.time - arrived + 6)
+        while node.levels["now"] < begun + PERIOD:
+            await node.clk()
+    node.levels["enable"] = 0
+    await node.clk()
+    assert not int(dut.locked.value)
+
+
+@pytest.mark.parametrize("pll", [0, 1])
+def test_process_link(pll):
+    run("process_link", __file__, CLK_HZ=CLK_HZ, PLL=pll)

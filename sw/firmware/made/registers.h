@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xa49b4ceau  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x86ba2279u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -792,6 +792,42 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINK_FRAMING_ERRORS_MASK 0x0000ffffu
 #define LINK_FRAMING_ERRORS_SHIFT 0
 #define LINK_FRAMING_ERRORS_WIDTH 16
+// w: PLL: time from one request to the next, as the host has set it, at least 2048 cycles; 0: off.
+// Change it while `enable` is 0 [cycle]
+#define LINK_PLL_PERIOD 0x030u
+#define LINK_PLL_PERIOD_MASK 0x000fffffu
+#define LINK_PLL_PERIOD_SHIFT 0
+#define LINK_PLL_PERIOD_WIDTH 20
+// w: PLL: time from a capture of the read list to the expected request, at most 3/8 of
+// `pll_period`. Change it while `enable` is 0 [cycle]
+#define LINK_CAPTURE_LEAD 0x034u
+#define LINK_CAPTURE_LEAD_MASK 0x0007ffffu
+#define LINK_CAPTURE_LEAD_SHIFT 0
+#define LINK_CAPTURE_LEAD_WIDTH 19
+// r: state of the PLL; all bits are 0 in a node without one
+#define LINK_PLL_STATE 0x038u
+// the link has a PLL
+#define LINK_PLL_STATE_BUILT_MASK 0x00000001u
+#define LINK_PLL_STATE_BUILT_SHIFT 0
+#define LINK_PLL_STATE_BUILT_WIDTH 1
+// it is locked: replies carry captures
+#define LINK_PLL_STATE_LOCKED_MASK 0x00000002u
+#define LINK_PLL_STATE_LOCKED_SHIFT 1
+#define LINK_PLL_STATE_LOCKED_WIDTH 1
+// as a value of a reply: it was read for a capture, not when the request came
+#define LINK_PLL_STATE_CAPTURED_MASK 0x00000004u
+#define LINK_PLL_STATE_CAPTURED_SHIFT 2
+#define LINK_PLL_STATE_CAPTURED_WIDTH 1
+// how much later than expected the last request came; 0 at the first one [cycle]
+#define LINK_PLL_STATE_PHASE_ERROR_MASK 0xffffff00u
+#define LINK_PLL_STATE_PHASE_ERROR_SHIFT 8
+#define LINK_PLL_STATE_PHASE_ERROR_WIDTH 24
+// r: time of the node, low word, when the reading of the read list began; 0 in a node without a PLL
+// [cycle]
+#define LINK_READ_TIME 0x03cu
+#define LINK_READ_TIME_MASK 0xffffffffu
+#define LINK_READ_TIME_SHIFT 0
+#define LINK_READ_TIME_WIDTH 32
 
 // axis: position, servo, profile, drive-enable interlock
 // rw: requests; the interlock decides; a field of two bits holds if both are 1, so no single

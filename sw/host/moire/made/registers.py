@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xA49B4CEA  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x86BA2279  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -915,6 +915,51 @@ FIELDS = (
         0x2C, 0, 16, False, "rw", "",
         Fraction(1, 1),
         "bytes without a stop bit; writing clears the count, which stops at its largest value",
+    ),
+    Field(
+        "link", "pll_period", "value",
+        0x30, 0, 20, False, "w", "cycle",
+        Fraction(1, 1),
+        "PLL: time from one request to the next, as the host has set it, at least 2048 "
+        "cycles; 0: off. Change it while `enable` is 0",
+    ),
+    Field(
+        "link", "capture_lead", "value",
+        0x34, 0, 19, False, "w", "cycle",
+        Fraction(1, 1),
+        "PLL: time from a capture of the read list to the expected request, at most 3/8 of "
+        "`pll_period`. Change it while `enable` is 0",
+    ),
+    Field(
+        "link", "pll_state", "built",
+        0x38, 0, 1, False, "r", "",
+        Fraction(1, 1),
+        "the link has a PLL",
+    ),
+    Field(
+        "link", "pll_state", "locked",
+        0x38, 1, 1, False, "r", "",
+        Fraction(1, 1),
+        "it is locked: replies carry captures",
+    ),
+    Field(
+        "link", "pll_state", "captured",
+        0x38, 2, 1, False, "r", "",
+        Fraction(1, 1),
+        "as a value of a reply: it was read for a capture, not when the request came",
+    ),
+    Field(
+        "link", "pll_state", "phase_error",
+        0x38, 8, 24, True, "r", "cycle",
+        Fraction(1, 1),
+        "how much later than expected the last request came; 0 at the first one",
+    ),
+    Field(
+        "link", "read_time", "value",
+        0x3C, 0, 32, False, "r", "cycle",
+        Fraction(1, 1),
+        "time of the node, low word, when the reading of the read list began; 0 in a node "
+        "without a PLL",
     ),
     Field(
         "axis", "control", "enable",
