@@ -88,10 +88,11 @@ def mask(machine: Machine, name: str) -> int:
 
 
 def link_parameters(machine: Machine) -> dict[str, int]:
-    """The parameters of the node that choose the carrier of its link."""
+    """The parameters of the node that choose the carrier of its link, and its PLL."""
     carrier = 1 if machine.ip_address else 2 if SPI_LINK in machine.peripherals else 0
     built = carrier or SERIAL_LINK in machine.peripherals
-    return {"HAS_LINK": int(bool(built)), **({"LINK_CARRIER": carrier} if carrier else {})}
+    chosen = {"LINK_CARRIER": carrier, "LINK_PLL": int(machine.link_pll)}
+    return {"HAS_LINK": int(bool(built)), **{name: n for name, n in chosen.items() if n}}
 
 
 def parameters(board: Board, machine: Machine) -> dict[str, int | str]:

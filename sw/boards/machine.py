@@ -187,6 +187,7 @@ class Machine:
     axes: list[Axis]
     peripherals: list[str]
     ip_address: str  # of the real-time link over Ethernet; empty: it is not over Ethernet
+    link_pll: bool  # the real-time link has a PLL
     unused: list[str]  # signals of the node that are not connected
     wiring: dict[str, Wiring]  # by layout
 
@@ -355,6 +356,8 @@ def check(machine: Machine) -> None:
             f"{SERIAL_LINK} the one over a serial line, {SPI_LINK} the one over SPI: a node has "
             "one of them"
         )
+    if machine.link_pll and not links and not machine.ip_address:
+        raise Misfit(f"{file}: [node] link_pll needs a real-time link")
     if machine.scope_words and machine.scope_words not in SCOPE_WORDS:
         raise Misfit(
             f"{file}: [node] scope_words = {machine.scope_words} must be 0 or a power of two from "
@@ -423,6 +426,7 @@ def load(path: Path) -> Machine:
         axes=[axis_of(row) for row in table.rows("axis")],
         peripherals=[] if is_relay else kind.chosen("peripherals", PERIPHERALS),
         ip_address="" if is_relay else ip_address_of(kind.table("ethernet")),
+        link_pll=not is_relay and kind.take("link_pll", bool, False),
         unused=kind.chosen("unused", RELAY_SIGNALS if is_relay else NODE_SIGNALS),
         wiring={layout: wiring_of(layouts.table(layout), between) for layout in list(layouts.left)},
     )

@@ -92,10 +92,11 @@ static void count_refused(struct link* link) {
     }
 }
 
-// The latches, before what depends on them.
+// The latches, before what depends on them. Values that were read before the last access of a
+// latch do not show it yet.
 static void take_captures(struct link* link, const uint32_t* words) {
     unsigned axes = link->node.axes;
-    for (unsigned n = 0; n < axes; n++)
+    for (unsigned n = 0; n < axes && link->node.fresh; n++)
         latch_look(&link->latch[n], words[list_word(READ_FEEDBACK_CAPTURE_STATE, axes, n)]);
     if (link->asked < axes)
         latch_answer(&link->latch[link->asked], link->reply.spare,
@@ -120,8 +121,12 @@ static bool take_reply(struct link* link) {
     count_refused(link);
     if (link->started && link->reply.expired) *pins->watchdog_has_bit = 1;
     const uint32_t* words = link->reply.values;
-    node_clock_take(&link->clock, of->time, words[READ_NODE_TICK_COUNT.fixed]);
+    node_clock_take(&link->clock, of->time, words[READ_NODE_TICK_COUNT.fixed], of->read_time);
     *pins->lateness = link->clock.late / of->clk_hz / MS;
+    *pins->pll_locked = of->captured;
+    *pins->pll_phase_error = of->phase_error / of->clk_hz / MS;
+    int32_t age = of->captured ? (int32_t)(of->time - of->read_time) : 0;
+    *pins->capture_age = age / of->clk_hz / MS;
     *pins->drift = node_clock_drift(&link->clock);
     take_captures(link, words);
     take_inputs(link, words);

@@ -23,12 +23,16 @@ struct node {
     unsigned drives;  // axes with a drive; they come first, the others are encoders
     bool probes;      // all axes with a drive capture edges of a touch probe
     double clk_hz;
-    double tick;       // cycles of a servo tick
-    uint32_t time;     // in the last reply, cycles
-    int64_t time_at;   // ns, when the request was sent that it answers
-    int64_t sent_at;   // ns, of the last request
-    int64_t patience;  // ns, with each request of the check
-    char why[160];     // why it cannot be used, one sentence
+    double tick;         // cycles of a servo tick
+    uint32_t time;       // in the last reply, cycles
+    uint32_t read_time;  // at which the values of the last reply were read, cycles
+    bool captured;       // they were read before the request, when the PLL of the node had it done
+    bool fresh;          // they were read after the request before
+    double phase_error;  // cycles, that a request was later than the PLL of the node expected
+    int64_t time_at;     // ns, when the request was sent that it answers
+    int64_t sent_at;     // ns, of the last request
+    int64_t patience;    // ns, with each request of the check
+    char why[160];       // why it cannot be used, one sentence
 };
 
 // Opens the carrier to a node with `axes` axes and checks that the node has this session and fits
@@ -52,7 +56,7 @@ static inline int64_t position_word(const uint32_t* words, struct list_place pla
 // A pin `scale`, periods per unit; 1 as long as it is 0.
 static inline double scale_of(double scale) { return scale == 0 ? 1 : scale; }
 
-// Takes the time of the node from the reply to the last request.
+// Takes the time of the node, and of the values, from the reply to the last request.
 void node_take_time(struct node* node, const struct link_reply* reply);
 
 // Time of the node in cycles when a request that is sent now will arrive.

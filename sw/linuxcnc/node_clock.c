@@ -16,12 +16,13 @@ void node_clock_start(struct node_clock* clock, double period_s, double clk_hz, 
 
 void node_clock_step(struct node_clock* clock) { clock->now += clock->step; }
 
-void node_clock_take(struct node_clock* clock, uint32_t time, uint32_t tick) {
+void node_clock_take(struct node_clock* clock, uint32_t time, uint32_t tick, uint32_t tick_time) {
     int32_t late = (int32_t)(time - (uint32_t)(int64_t)floor(clock->now));
     if (!clock->running || fabs((double)late) > MOST_LATE * clock->nominal) {
         clock->running = true;
         clock->step = clock->nominal;
-        clock->now = clock->base = time;
+        clock->now = time;
+        clock->base = clock->now + (int32_t)(tick_time - time);
         clock->base_tick = tick;
         clock->late = 0;
         return;

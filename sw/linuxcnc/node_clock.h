@@ -29,8 +29,9 @@ void node_clock_start(struct node_clock* clock, double period_s, double clk_hz, 
 // A servo period has passed.
 void node_clock_step(struct node_clock* clock);
 
-// A reply has come to the request of this period: the time and the tick of the node in it.
-void node_clock_take(struct node_clock* clock, uint32_t time, uint32_t tick);
+// A reply has come to the request of this period: the time at which the node had the request, its
+// tick, and the time at which the tick was read.
+void node_clock_take(struct node_clock* clock, uint32_t time, uint32_t tick, uint32_t tick_time);
 
 // The servo tick of the node, with its fraction, `cycles` after the present request.
 double node_clock_tick(const struct node_clock* clock, double cycles);

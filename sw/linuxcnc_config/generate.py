@@ -18,6 +18,7 @@ import jinja2
 from boards import machine as machines
 from boards.toml_file import Misfit, Table, read
 from linuxcnc_config.set_up import LONGEST_SESSION
+from moire.client.link import MOST_LEAD
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 LETTERS = "XYZABCUVW"
@@ -81,6 +82,7 @@ class Configuration:
     period_ns: int
     axes: list[Joint]
     spindle: Spindle | None = None  # the axis of the node after the joints
+    capture_us: float | None = None  # that captures lead a packet; None: read with the packet
     probe: bool = False  # whether the axes capture edges of a touch probe
     session: int = 0  # of the link; 0: one is drawn for each configuration that is made
     simulated: bool = False
@@ -200,6 +202,18 @@ def spindle_of(row: Table) -> Spindle:
     return Spindle(row.take("name", str), periods)
 
 
+def capture_of(table: Table, has_pll: bool) -> float | None:
+    """The key capture_us of [linuxcnc]; None without one."""
+    if "capture_us" not in table.left:
+        return None
+    capture, most = table.take("capture_us", float), MOST_LEAD * SERVO_MS * 1e3
+    if not 0 <= capture <= most:
+        raise table.misfit(f"capture_us {capture:g} must be 0 to {most:g}, 3/8 of the period")
+    if not has_pll:
+        raise table.misfit("capture_us needs link_pll = true in [node]")
+    return capture
+
+
 def load(name: str) -> Configuration:
     """The configuration of a machine; Misfit, one line, if its file does not describe one."""
     machine = machines.named(name)
@@ -214,6 +228,7 @@ def load(name: str) -> Configuration:
     delay = table.take("delay_ms", float, 5.0)
     if delay < LEAST_DELAY_MS:
         raise table.misfit(f"delay_ms {delay:g}: a set-point needs {LEAST_DELAY_MS:g} at least")
+    capture = capture_of(table, machine.link_pll)
     table.close()
     behind = delay + 2 * SERVO_MS
     rows = file.rows("axis")
@@ -238,6 +253,7 @@ def load(name: str) -> Configuration:
         period,
         joints,
         spindle=others[0] if others else None,
+        capture_us=capture,
         probe=all("capture" in row.left.get("features", []) for row in driven),
     )
 

@@ -4,6 +4,8 @@
 # the registers that each packet carries, in their order
 READS = (
     "node.tick_count",
+    "link.pll_state",
+    "link.read_time",
     "axis.state",
     "axis.faults",
     "axis.first_fault",

@@ -14,7 +14,7 @@ from linuxcnc_config.lists import READS, WRITES
 from moire.bus.transport import open_bus
 from moire.client.axis import Axis
 from moire.client.bus import Bus
-from moire.client.link import ProcessData
+from moire.client.link import Captures, ProcessData
 from moire.client.node import Node
 from moire.errors import MoireError
 
@@ -49,10 +49,11 @@ def set_up(
     watchdog_s: float = WATCHDOG_S,
     force: bool = False,
     backlash: Mapping[int, Backlash] = {},
+    captures: Captures | None = None,
 ) -> None:
     """Sets the link of a node up and switches it on; Unfit if it has none, has another number of
     axes, or serves another host, unless it is to be taken from that by `force`. `backlash` is that
-    of axes by their numbers.
+    of axes by their numbers. `captures`: when the node reads what it replies.
     """
     state = node.read_named("link.state")
     if not state["built"]:
@@ -64,7 +65,9 @@ def set_up(
         raise Unfit(f"another host runs the node, in session {state['session']}")
     for number, one in backlash.items():
         Axis(node, number).set_backlash(*one)
-    ProcessData(WRITES, READS).set_up(node, bit_time, watchdog_s, session=session)
+    ProcessData(WRITES, READS).set_up(
+        node, bit_time, watchdog_s, session=session, captures=captures
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -85,7 +88,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="backlash of an axis, how fast it is taken up, after which motion back, and the side "
         "on which the sensor is, motor or table: 0:5um:2mm/s:0.5um:table",
     )
+    parser.add_argument(
+        "--capture",
+        metavar="US:PERIOD",
+        help="microseconds before each packet at which the node reads its registers, and the "
+        "period of the packets in microseconds: 200:1000; without, it reads them with the packet",
+    )
     options = parser.parse_args(arguments)
+    captures = None
+    if options.capture is not None:
+        try:
+            lead_us, period_us = map(float, options.capture.split(":"))
+        except ValueError:
+            parser.error("--capture needs two numbers, as 200:1000")
+        captures = Captures(period_us * 1e-6, lead_us * 1e-6)
     try:
         backlash = dict(Backlash.parsed(text) for text in options.backlash)
     except (ValueError, KeyError):
@@ -93,7 +109,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with open_bus(options.port) as port:
             node = Bus(port).node(options.address)
-            set_up(node, options.axes, options.session, force=options.force, backlash=backlash)
+            set_up(
+                node,
+                options.axes,
+                options.session,
+                force=options.force,
+                backlash=backlash,
+                captures=captures,
+            )
     except (MoireError, Unfit) as why:
         print(f"moire: {options.port}: {why}", file=sys.stderr)
         return 1

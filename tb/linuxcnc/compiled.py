@@ -103,7 +103,9 @@ class Node(ctypes.Structure):
         *((name, ctypes.c_uint) for name in ("axes", "drives")),
         ("probes", ctypes.c_bool),
         *((name, ctypes.c_double) for name in ("clk_hz", "tick")),
-        ("time", ctypes.c_uint32),
+        *((name, ctypes.c_uint32) for name in ("time", "read_time")),
+        *((name, ctypes.c_bool) for name in ("captured", "fresh")),
+        ("phase_error", ctypes.c_double),
         *((name, ctypes.c_int64) for name in ("time_at", "sent_at", "patience")),
         ("why", ctypes.c_char * 160),
     ]

@@ -363,6 +363,17 @@ def test_a_link_over_spi_has_four_pins(tmp_path):
     assert ".link_cs_n(1'b1)" in plain["top.sv"] and "LINK_CARRIER" not in plain["top.sv"]
 
 
+def test_the_pll_of_a_link_is_built_where_the_machine_asks_for_it(tmp_path):
+    path = over_spi(tmp_path)
+    without = fit(board.named("ulx3s_25f"), machine.load(path))
+    assert "LINK_PLL" not in without.parameters
+    path.write_text(path.read_text().replace('["link_spi"]', '["link_spi"]\nlink_pll = true'))
+    with_it = fit(board.named("ulx3s_25f"), machine.load(path))
+    assert with_it.parameters == without.parameters | {"LINK_PLL": 1}
+    path.write_text(path.read_text().replace('["link_spi"]', "[]"))
+    assert "link_pll needs a real-time link" in refusal(lambda: machine.load(path))
+
+
 def test_a_link_over_spi_with_a_wrong_level_or_beside_another_link_is_refused(tmp_path):
     path = over_spi(tmp_path, volts=5.0)
     found = refusal(lambda: fit(board.named("ulx3s_25f"), machine.load(path)))

@@ -21,14 +21,24 @@ class Pin:
         self._bench.set(**{self._name: int(level)})
 
 
+class Parameter:
+    """A parameter of a design as cocotb shows it."""
+
+    def __init__(self, value):
+        self.value = value
+
+
 class Handle:
-    """The pins of a bench as attributes, and its clock as a sequence of edges."""
+    """The pins of a bench as attributes, its parameters too if it has some in a table, and its
+    clock as a sequence of edges.
+    """
 
     def __init__(self, bench):
         self._bench, self._high = bench, False
 
     def __getattr__(self, name):
-        return Pin(self._bench, name)
+        parameters = getattr(self._bench, "parameters", {})
+        return Parameter(parameters[name]) if name in parameters else Pin(self._bench, name)
 
     def edge(self, rising):
         """A whole cycle for each rising edge, and for each falling one that follows no rising."""

@@ -31,6 +31,7 @@ PARAMETERS = {
     "HAS_DISPLAY": 1,
     "HAS_STATUS_INPUTS": 1,
     "HAS_LINK": 1,
+    "LINK_PLL": 1,
     "SCOPE_WORDS": 256,
     "HAS_SET_POINTS": 3,
     "HAS_BACKLASH": 3,

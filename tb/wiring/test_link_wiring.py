@@ -108,3 +108,20 @@ def test_a_silent_host_stops_all_axes(node):
     judge(node, 0, "link_watchdog", both=True)
     node.write("link.enable", 0)
     assert node.read("link.state", "on") == 0 and node.read("link.state", "expired") == 0
+
+
+def test_the_pll_follows_the_requests_and_captures_before_them(node):
+    assert node.fields("link.pll_state") == dict(built=1, locked=0, captured=0, phase_error=0)
+    period, lead, late = 20_000, 2_000, 100
+    host = set_up(node, pll_period=period, capture_lead=lead)
+    begun = node.now
+    for n in range(67):
+        node.run(begun + n * period - node.now + (late if n == 66 else 0))
+        reply = host.reply(exchange(node, host.request(0, [0, 0]))[0])
+        locked = int(n > 63)
+        assert node.read("link.pll_state", "locked") == locked
+        low, high, *_ = reply.values  # node.time_stamp
+        assert (low - reply.time > 0) == (not locked) and high == 0
+    assert abs(node.read("link.pll_state", "phase_error") - late) <= 2
+    assert abs(reply.time - low - lead - late) < 60
+    assert abs(node.read("link.read_time") - low) < 10

@@ -10,18 +10,20 @@ struct list_place {
 };
 
 static const struct list_place READ_NODE_TICK_COUNT = {.fixed = 0, .each = 0, .width = 1};
-static const struct list_place READ_AXIS_STATE = {.fixed = 1, .each = 0, .width = 1};
-static const struct list_place READ_AXIS_FAULTS = {.fixed = 1, .each = 1, .width = 1};
-static const struct list_place READ_AXIS_FIRST_FAULT = {.fixed = 1, .each = 2, .width = 1};
-static const struct list_place READ_AXIS_POSITION = {.fixed = 1, .each = 3, .width = 2};
-static const struct list_place READ_AXIS_TARGET = {.fixed = 1, .each = 5, .width = 2};
-static const struct list_place READ_AXIS_VELOCITY = {.fixed = 1, .each = 7, .width = 1};
-static const struct list_place READ_AXIS_FOLLOWING_ERROR = {.fixed = 1, .each = 8, .width = 1};
-static const struct list_place READ_AXIS_STREAM_STATE = {.fixed = 1, .each = 9, .width = 1};
-static const struct list_place READ_AXIS_STREAM_COUNTS = {.fixed = 1, .each = 10, .width = 1};
-static const struct list_place READ_AXIS_SUPERVISION = {.fixed = 1, .each = 11, .width = 1};
-static const struct list_place READ_FEEDBACK_CAPTURE_STATE = {.fixed = 1, .each = 12, .width = 1};
-enum { READS_FIXED = 1, READS_EACH = 13 };
+static const struct list_place READ_LINK_PLL_STATE = {.fixed = 1, .each = 0, .width = 1};
+static const struct list_place READ_LINK_READ_TIME = {.fixed = 2, .each = 0, .width = 1};
+static const struct list_place READ_AXIS_STATE = {.fixed = 3, .each = 0, .width = 1};
+static const struct list_place READ_AXIS_FAULTS = {.fixed = 3, .each = 1, .width = 1};
+static const struct list_place READ_AXIS_FIRST_FAULT = {.fixed = 3, .each = 2, .width = 1};
+static const struct list_place READ_AXIS_POSITION = {.fixed = 3, .each = 3, .width = 2};
+static const struct list_place READ_AXIS_TARGET = {.fixed = 3, .each = 5, .width = 2};
+static const struct list_place READ_AXIS_VELOCITY = {.fixed = 3, .each = 7, .width = 1};
+static const struct list_place READ_AXIS_FOLLOWING_ERROR = {.fixed = 3, .each = 8, .width = 1};
+static const struct list_place READ_AXIS_STREAM_STATE = {.fixed = 3, .each = 9, .width = 1};
+static const struct list_place READ_AXIS_STREAM_COUNTS = {.fixed = 3, .each = 10, .width = 1};
+static const struct list_place READ_AXIS_SUPERVISION = {.fixed = 3, .each = 11, .width = 1};
+static const struct list_place READ_FEEDBACK_CAPTURE_STATE = {.fixed = 3, .each = 12, .width = 1};
+enum { READS_FIXED = 3, READS_EACH = 13 };
 
 static const struct list_place WRITE_AXIS_SET_POINT_POSITION = {.fixed = 0, .each = 0, .width = 2};
 static const struct list_place WRITE_AXIS_SET_POINT_VELOCITY = {.fixed = 0, .each = 2, .width = 1};

@@ -32,6 +32,9 @@ struct node_pins {
     hal_u32_t* refused_cause;
     hal_float_t* latency;
     hal_float_t* lateness;
+    hal_bit_t* pll_locked;
+    hal_float_t* pll_phase_error;
+    hal_float_t* capture_age;
     hal_float_t* drift;
     hal_bit_t* estop;
     hal_bit_t* fault;
@@ -56,6 +59,9 @@ static const struct moire_pin NODE_PINS[] = {
     {"refused-cause", HAL_U32, HAL_OUT, offsetof(struct node_pins, refused_cause)},
     {"latency", HAL_FLOAT, HAL_OUT, offsetof(struct node_pins, latency)},
     {"lateness", HAL_FLOAT, HAL_OUT, offsetof(struct node_pins, lateness)},
+    {"pll-locked", HAL_BIT, HAL_OUT, offsetof(struct node_pins, pll_locked)},
+    {"pll-phase-error", HAL_FLOAT, HAL_OUT, offsetof(struct node_pins, pll_phase_error)},
+    {"capture-age", HAL_FLOAT, HAL_OUT, offsetof(struct node_pins, capture_age)},
     {"drift", HAL_FLOAT, HAL_OUT, offsetof(struct node_pins, drift)},
     {"estop", HAL_BIT, HAL_OUT, offsetof(struct node_pins, estop)},
     {"fault", HAL_BIT, HAL_OUT, offsetof(struct node_pins, fault)},

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from moire.bus.link import SESSION_BITS, Link, Reply
+from moire.client.names import CAUSE_CODES, refusal
 from moire.client.node import Node
 from moire.errors import OutOfRange, Refused, UnknownName, with_more
 from moire.made import link_tables as layout
@@ -21,6 +22,41 @@ from moire.made.registers import BLOCKS, FIELDS
 WATCHDOG_S = 0.01
 WORD_BITS = 32
 LONGEST_WINDOW = (1 << 24) - 1  # cycles
+PERIOD_S = 0.25e-3, 10e-3  # of requests, the shortest and the longest one that the PLL follows
+PERIOD_CYCLES = 2048, (1 << 20) - 1  # the same in cycles of the node
+MOST_LEAD = 3 / 8  # of a period
+
+
+@dataclass(frozen=True)
+class Captures:
+    """That the PLL of the node follows the requests, which come every `period_s`, and captures the
+    registers of the read list `lead_s` before it expects a request.
+    """
+
+    period_s: float
+    lead_s: float
+
+    def cycles(self, clk_hz: int) -> tuple[int, int]:
+        """Period and lead in cycles of a node; OutOfRange if one is not possible."""
+        low, high = PERIOD_S
+        if not low <= self.period_s <= high:
+            raise OutOfRange(
+                f"the period of requests is {1e3 * self.period_s:g} ms: a PLL follows "
+                f"{1e3 * low:g} to {1e3 * high:g} ms"
+            )
+        if not 0 <= self.lead_s <= MOST_LEAD * self.period_s:
+            raise OutOfRange(
+                f"the captures lead by {1e6 * self.lead_s:g} us: choose from 0 to "
+                f"{1e6 * MOST_LEAD * self.period_s:g} us, 3/8 of the period"
+            )
+        period = round(self.period_s * clk_hz)
+        least, most = PERIOD_CYCLES
+        if not least <= period <= most:
+            raise OutOfRange(
+                f"the period of requests is {period} cycles of the node: a PLL follows "
+                f"{least} to {most}"
+            )
+        return period, round(self.lead_s * clk_hz)
 
 
 @dataclass(frozen=True)
@@ -69,12 +105,14 @@ class ProcessData:
         watchdog_s: float = WATCHDOG_S,
         time_window: int = 0,
         session: int | None = None,
+        captures: Captures | None = None,
     ) -> Link:
         """Writes the lists and the settings over the bus, and switches the link on. Returns the
         session, whose number is drawn unless it is given.
 
         bit_time: 1/16 cycle of the node; as it is if None. watchdog_s: longest time without a good
-        request. time_window: cycles, 0 for no check. Refused `not_built` without a link.
+        request. time_window: cycles, 0 for no check. captures: None reads the registers when a
+        request comes. Refused `not_built` without a link, or for captures without its PLL.
         """
         axes = node.read_named("node.build")["axes"]
         written, read = places(self.writes, axes), places(self.reads, axes)
@@ -87,6 +125,7 @@ class ProcessData:
             raise OutOfRange(
                 f"the time window is {time_window} cycles: choose from 0 to {LONGEST_WINDOW}"
             )
+        period, lead = (0, 0) if captures is None else self.timing(node, captures)
         number = secrets.randbits(SESSION_BITS) if session is None else session
         link = Link(number, len(written), len(read))
         self.switch_off(node)
@@ -101,6 +140,8 @@ class ProcessData:
         node.write_named("link.lists", writes=len(written), reads=len(read))
         node.write_named("link.time_window", value=time_window)
         node.write_named("link.watchdog_time", value=round(1000 * watchdog_s))
+        node.write_named("link.pll_period", value=period)
+        node.write_named("link.capture_lead", value=lead)
         if bit_time is not None:
             node.write_named("link.bit_time", value=bit_time)
         node.write_named("link.enable", value=1)
@@ -115,6 +156,15 @@ class ProcessData:
         for place, word in zip(self.read, reply.values, strict=True):
             name = place.register, place.axis
             found[name] = found.get(name, 0) | word << WORD_BITS * place.high
+        return found
+
+    @staticmethod
+    def timing(node: Node, captures: Captures) -> tuple[int, int]:
+        """Period and lead of the captures in cycles of the node, which must have a PLL."""
+        found = captures.cycles(node.read_named("node.clk_hz")["value"])
+        if not node.read_named("link.pll_state")["built"]:
+            refused = refusal(node.address, "captures", CAUSE_CODES["not_built"])
+            raise with_more(refused, "it needs LINK_PLL of rtl/node.sv")
         return found
 
     @staticmethod
