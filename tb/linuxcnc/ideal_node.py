@@ -198,7 +198,8 @@ CLEARS = placed("feedback", "strobes", capture_clear=1, arm_index=1)
 class IdealNode:
     """A node with `axes` ideal axes and its link. `spindle` is an encoder after them. `above` is
     the height of the tip of a touch probe over a surface, in periods, by the positions of the axes:
-    it is linear within a tick.
+    it is linear within a tick. With `has_pll` its link has a PLL, locked at once if the set-up asks
+    for captures.
     """
 
     def __init__(
@@ -207,6 +208,7 @@ class IdealNode:
         map_crc: int = MAP_CRC,
         spindle: IdealAxis | None = None,
         above: Callable[[Sequence[float]], float] = lambda positions: 1.0,
+        has_pll: bool = False,
     ) -> None:
         self.axes = [IdealAxis() for _ in range(axes)] + ([spindle] if spindle else [])
         self.drives, self.above, self.height = axes, above, 1.0
@@ -219,6 +221,10 @@ class IdealNode:
         self.lists: dict[int, int] = {}
         self.writes, self.reads, self.entry, self.drawn = 0, 0, 0, 0
         self.refused = [0] * len(layout.CAUSES)
+        self.has_pll, self.period, self.lead = has_pll, 0, 0  # of the link; cycles
+        self.captured: list[int] | None = None  # the values of the next reply; None: not captured
+        self.captures = False  # whether the read list is being read for that
+        self.read_time = 0  # cycles
         self.words: dict[int, int] = {}
         self.path: list[tuple[float, ...]] = []  # each ms of a stream: time, positions
         self.names: dict[int, Callable[[], int]] = {}
@@ -233,6 +239,14 @@ class IdealNode:
         names[address("node", "clk_hz")] = lambda: CLK_HZ
         names[address("node", "tick_period")] = lambda: TICK
         names[address("node", "tick_count")] = lambda: self.tick % WORD
+        names[address("link", "read_time")] = lambda: self.read_time % WORD * self.has_pll
+        names[address("link", "pll_state")] = lambda: placed(
+            "link",
+            "pll_state",
+            built=self.has_pll,
+            locked=self.captured is not None,
+            captured=self.captures,
+        )
         for n, axis in enumerate(self.axes):
 
             def wide(
@@ -308,8 +322,20 @@ class IdealNode:
     # ---- time
 
     def advance(self, cycles: int) -> None:
-        """The node runs."""
+        """The node runs until the next request, and captures its values before."""
         end = self.time + cycles
+        if self.session and self.period:
+            self._run(end - self.lead)
+            self.captures = True
+            self.captured = self._read_list()
+            self.captures = False
+        self._run(end)
+
+    def _read_list(self) -> list[int]:
+        self.read_time = self.time
+        return [self.read(self.lists[n] >> 16) for n in range(self.reads)]
+
+    def _run(self, end: int) -> None:
         while (self.tick + 1) * TICK <= end:
             self.tick += 1
             self.time = self.tick * TICK
@@ -382,7 +408,7 @@ class IdealNode:
         identity = layout.KIND_REPLY | self.session << 8
         for n, value in enumerate(words[layout.REQUEST_WORDS : layout.REQUEST_WORDS + self.writes]):
             self.write(self.lists[n] & 0xFFFF, value)
-        values = [self.read(self.lists[n] >> 16) for n in range(self.reads)]
+        values = self._read_list() if self.captured is None else self.captured
         spare, spare_value = words[-3], words[-2]
         read = 0 if spare >> 31 else self.read(spare & 0xFFFF)
         if spare >> 31:
@@ -395,7 +421,7 @@ class IdealNode:
     def restart(self) -> None:
         """The node loses its power and starts again."""
         self.session = self.sequence = self.time = self.tick = self.heard_at = 0
-        self.words = {}
+        self.words, self.captured, self.period = {}, None, 0
         self.refused = [0] * len(layout.CAUSES)
         for axis in self.axes:
             axis.__init__(position=axis.position, turn=axis.turn, spin=axis.spin)
@@ -412,16 +438,24 @@ class IdealNode:
             self.lists[self.entry] = fields["write"] | fields["read"] << 16
         elif name == "link.entry_number":
             self.entry = fields["value"]
+        elif name == "link.pll_period":
+            self.period = fields["value"]
+        elif name == "link.capture_lead":
+            self.lead = fields["value"]
         elif name == "link.session":
             self.drawn = fields["value"]
         elif name == "link.enable":
             self.session, self.sequence = self.drawn * fields["value"], 0
-            self.heard_at = self.time
+            self.heard_at, self.captured = self.time, None
 
     def read_named(self, name: str) -> dict[str, int]:
         """Reads a register as a client of the bus would."""
         if name == "node.build":
             return {"axes": len(self.axes)}
+        if name == "node.clk_hz":
+            return {"value": CLK_HZ}
+        if name == "link.pll_state":
+            return {"built": self.has_pll}
         assert name == "link.state"
         on = self.session != 0
         return {"built": 1, "on": on, "expired": on and self.expired, "session": self.session}

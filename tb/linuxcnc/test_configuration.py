@@ -12,9 +12,10 @@ from linuxcnc_config.generate import CARRIERS, Misfit, load, texts
 from linuxcnc_config.lists import READS, WRITES
 from linuxcnc_config.set_up import Backlash, Unfit, set_up
 from linuxcnc_config.set_up import main as set_up_program
-from moire.client.link import places
+from moire.client.link import Captures, places
+from moire.errors import Refused
 from moire.made import link_tables as layout
-from tb.linuxcnc.ideal_node import IdealNode, address
+from tb.linuxcnc.ideal_node import CLK_HZ, IdealNode, address
 
 MILL = """
 title = "mill"
@@ -155,6 +156,37 @@ def test_the_touch_probe_comes_to_linuxcnc_if_all_axes_capture_its_edges(tmp_pat
     assert line in texts(load(written(tmp_path, features)))["mill.hal"]
 
 
+PLL = ('image = "steps"', 'image = "steps"\nperipherals = ["link"]\nlink_pll = true')
+
+
+def test_the_lead_of_the_captures_comes_to_the_set_up(tmp_path):
+    assert "--capture" not in texts(load(written(tmp_path, PLL)))["mill.hal"]
+    found = written(tmp_path, PLL)
+    text = Path(found).read_text()
+    Path(found).write_text(text.replace("[linuxcnc]", "[linuxcnc]\ncapture_us = 200"))
+    line = texts(load(found))["mill.hal"].split("set_up", 1)[1].splitlines()[0]
+    assert line.endswith(" --capture 200:1000")
+    Path(found).write_text(text.replace("[linuxcnc]", "[linuxcnc]\ncapture_us = 376"))
+    with pytest.raises(Misfit, match="capture_us 376 must be 0 to 375, 3/8 of the period"):
+        load(found)
+    without = text.replace("link_pll = true", "")
+    Path(found).write_text(without.replace("[linuxcnc]", "[linuxcnc]\ncapture_us = 0"))
+    with pytest.raises(Misfit, match=r"capture_us needs link_pll = true in \[node\]"):
+        load(found)
+
+
+def test_the_set_up_writes_the_captures_or_refuses_them_before_anything_is_written():
+    node = IdealNode(1)
+    with pytest.raises(Refused, match="it needs LINK_PLL"):
+        set_up(node, 1, 5, captures=Captures(1e-3, 2e-4))
+    assert not node.session
+    node = IdealNode(1, has_pll=True)
+    set_up(node, 1, 5, captures=Captures(1e-3, 2e-4))
+    assert (node.period, node.lead) == (CLK_HZ // 1000, CLK_HZ // 5000)
+    set_up(node, 1, 6, force=True)
+    assert (node.period, node.lead) == (0, 0)
+
+
 def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(tmp_path):
     found = load(written(tmp_path))
     sessions = [re.findall(r"session[ =](\d+)", texts(found)["mill.hal"]) for _ in range(3)]
@@ -239,5 +271,8 @@ def test_the_set_up_program_says_in_a_line_why_it_fails(capsys):
     with pytest.raises(SystemExit):
         set_up_program([*line, "--backlash", "0:5um"])
     assert "--backlash needs five parts" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        set_up_program([*line, "--capture", "200"])
+    assert "--capture needs two numbers, as 200:1000" in capsys.readouterr().err
     assert set_up_program(line) == 1
     assert re.fullmatch(r"moire: /dev/no_such_port: .*\n", capsys.readouterr().err)

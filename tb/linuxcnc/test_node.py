@@ -5,8 +5,9 @@ import ctypes
 
 import pytest
 
+from linuxcnc_config.lists import READS
 from linuxcnc_config.set_up import set_up
-from tb.linuxcnc.compiled import Node, driver
+from tb.linuxcnc.compiled import Node, Reply, driver
 from tb.linuxcnc.ideal_node import CLK_HZ, TICK, IdealAxis, IdealNode, Served, address, placed
 
 SESSION, PATIENCE_NS = 0x4D01, 10**9
@@ -55,3 +56,37 @@ def test_a_node_with_an_axis_without_captures_has_no_probe():
 def test_a_node_that_does_not_fit_is_refused_in_a_sentence(ideal, words):
     node, fits = opened(ideal(), 2)
     assert not fits and node.why.decode().startswith(words)
+
+
+def replied(node, time, **pll):
+    """A reply with this time, and registers of the PLL, has come."""
+    reply = Reply(time=time)
+    state = {name: value for name, value in pll.items() if name != "read_time"}
+    reply.values[READS.index("link.pll_state")] = placed("link", "pll_state", **state)
+    reply.values[READS.index("link.read_time")] = pll.get("read_time", 0)
+    driver().node_take_time(ctypes.byref(node), ctypes.byref(reply))
+    return node.read_time, node.captured, node.fresh, node.phase_error
+
+
+def test_values_that_were_captured_before_the_last_request_are_not_fresh():
+    node = Node()
+    assert replied(node, 1000) == (1000, False, True, 0), "a node without a PLL"
+    at = dict(built=1, locked=1)
+    assert replied(node, 2000, **at, read_time=2030) == (2030, False, True, 0)
+    late, early = 5, (1 << 24) - 7
+    assert replied(node, 3000, **at, captured=1, read_time=2700, phase_error=late) == (
+        2700,
+        True,
+        True,
+        5,
+    )
+    assert replied(node, 3650, **at, captured=1, read_time=2700, phase_error=early) == (
+        2700,
+        True,
+        False,
+        -7,
+    )
+    assert replied(node, 4900, **at, captured=1, read_time=3649)[2] is False
+    assert replied(node, 6000, **at, captured=1, read_time=5700)[2] is True
+    assert replied(node, 2**32 - 100, **at, read_time=2**32 - 90)[2] is True
+    assert replied(node, 900, **at, captured=1, read_time=50)[2] is True, "the time has wrapped"

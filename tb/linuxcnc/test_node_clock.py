@@ -26,8 +26,9 @@ def followed(periods, drift=0.0, jitter_s=0.0, lost=0.0, start=WORD - 5_000_000)
         true += CYCLES * (1 + drift)
         if dice.random() >= lost:
             late = dice.uniform(0, jitter_s) * CLK_HZ
+            time = int(true + late) % WORD
             driver().node_clock_take(
-                ctypes.byref(clock), int(true + late) % WORD, int((true + late) / TICK) % WORD
+                ctypes.byref(clock), time, int((true + late) / TICK) % WORD, time
             )
             errors.append((clock.now - clock.base) - (true - start))
     return clock, errors
@@ -56,8 +57,17 @@ def test_its_ticks_are_those_of_the_node_over_a_wrap_of_the_time():
 def test_a_node_that_was_restarted_is_followed_from_its_new_time():
     clock, _ = followed(100)
     driver().node_clock_step(ctypes.byref(clock))
-    driver().node_clock_take(ctypes.byref(clock), 10**9, 3)
+    driver().node_clock_take(ctypes.byref(clock), 10**9, 3, 10**9)
     assert (clock.now, clock.base_tick, clock.step) == (10**9, 3, CYCLES)
+
+
+def test_a_tick_that_was_read_before_the_request_belongs_to_the_time_of_its_reading():
+    for time in (10**9, 2 * TICK):  # the time wraps between reading and request
+        clock, _ = followed(100)
+        driver().node_clock_step(ctypes.byref(clock))
+        driver().node_clock_take(ctypes.byref(clock), time, 40, (time - 3 * TICK) % WORD)
+        assert clock.now == time
+        assert driver().node_clock_tick(ctypes.byref(clock), ctypes.c_double(0)) == 43
 
 
 def test_a_parabola_is_met_exactly_at_any_time_between():

@@ -32,7 +32,16 @@ from linuxcnc_config.programs import (
     threaded,
 )
 from linuxcnc_config.set_up import set_up
-from tb.linuxcnc.ideal_node import CLK_HZ, STREAMING, TICK, IdealAxis, IdealNode, Served
+from moire.client.link import Captures
+from tb.linuxcnc.ideal_node import (
+    CLK_HZ,
+    PERIOD_CYCLES,
+    STREAMING,
+    TICK,
+    IdealAxis,
+    IdealNode,
+    Served,
+)
 
 SESSION = 0x4D01
 PERIODS_PER_MM = 250.0
@@ -42,6 +51,7 @@ TICK_S = TICK / CLK_HZ
 MOST_ERROR_MM = 4 * 500 * 1e-6 / 4 * 4 / 27
 PERIODS_PER_TURN, TURNS_S, PITCH_MM = 1024, 20, 0.5
 CATCH_UP = 200  # ticks
+CAPTURES = Captures(PERIOD_CYCLES / CLK_HZ, 0.3e-3)
 LSB_MM = 1 / 65536 / PERIODS_PER_MM
 
 PROGRAMS = {
@@ -84,6 +94,7 @@ drives = ["stepper"]
         for name in ("X", "Y", "Y2", "Z")
     }.items()
 )
+PLL_PINS = [f"moire.0.{name}" for name in ("pll-locked", "pll-phase-error", "capture-age")]
 LATCHES = [f"moire.0.axis.{n}.position-latch" for n in range(3)]
 COUNTS = [f"moire.0.encoder.3.{name}" for name in ("count", "rawcounts")]
 PINS = {  # steps after a program
@@ -119,9 +130,9 @@ def reason():
 
 
 def run(folder, served, steps, programs=None):
-    """LinuxCNC with the mill and a spindle at a served node."""
+    """LinuxCNC with the mill and a spindle at a served node, which captures if it has a PLL."""
     axes = len(served.node.axes)
-    set_up(served.node, axes, SESSION)
+    set_up(served.node, axes, SESSION, captures=CAPTURES if served.node.has_pll else None)
     node = f"udp:127.0.0.1:{served.port}"
     spindle = Spindle("S", PERIODS_PER_TURN) if axes > 3 else None
     mill = replace(load("mill_linuxcnc"), bus="", node=node, session=SESSION, simulated=True)
@@ -200,12 +211,16 @@ class Day(NamedTuple):
         return self.ran.report[-1]["messages"]
 
 
-@pytest.fixture(scope="module")
-def day(tmp_path_factory):
-    """All programs, and what interrupts them."""
+@pytest.fixture(scope="module", params=[False, True], ids=["read on request", "captured before"])
+def day(tmp_path_factory, request):
+    """All programs, and what interrupts them, with a node that replies what it reads when a request
+    comes, and with one that captures it before.
+    """
     spin = PERIODS_PER_TURN * TURNS_S * TICK_S
-    node = IdealNode(3, spindle=IdealAxis(turn=PERIODS_PER_TURN, spin=spin), above=above)
-    steps = [["on"], ["home"]]
+    node = IdealNode(
+        3, spindle=IdealAxis(turn=PERIODS_PER_TURN, spin=spin), above=above, has_pll=request.param
+    )
+    steps = [["on"], ["home"], ["pins", *PLL_PINS]]
     for name in [*PROGRAMS, "lathe"]:
         steps += [["start", f"{name}.ngc"], ["finish"], *PINS.get(name, [])]
     steps += [["start", "held.ngc"], ["line", FIRST_LINE], ["override", 0.5]]
@@ -234,6 +249,12 @@ def test_circle_pocket_helix_and_blended_corners_are_on_their_paths(day):
     print({name: f"{1000 * error:.4f} um" for name, error in errors.items()})
     assert 0.01 < errors.pop("corners") <= 0.05
     assert max(errors.values()) < MOST_ERROR_MM
+
+
+def test_the_pins_of_the_pll_say_how_long_before_the_request_the_node_captured(day):
+    locked, error, age_ms = day.pins(PLL_PINS)
+    assert (locked, error) == (day.node.has_pll, 0)
+    assert age_ms == pytest.approx(1e3 * CAPTURES.lead_s if locked else 0)
 
 
 def test_the_points_that_g38_touches_are_on_the_surface(day):
