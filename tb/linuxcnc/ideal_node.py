@@ -202,6 +202,8 @@ class IdealNode:
     for captures.
     """
 
+    address = 1  # on the bus
+
     def __init__(
         self,
         axes: int,

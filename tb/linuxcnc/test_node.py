@@ -73,20 +73,12 @@ def test_values_that_were_captured_before_the_last_request_are_not_fresh():
     assert replied(node, 1000) == (1000, False, True, 0), "a node without a PLL"
     at = dict(built=1, locked=1)
     assert replied(node, 2000, **at, read_time=2030) == (2030, False, True, 0)
-    late, early = 5, (1 << 24) - 7
-    assert replied(node, 3000, **at, captured=1, read_time=2700, phase_error=late) == (
-        2700,
-        True,
-        True,
-        5,
-    )
-    assert replied(node, 3650, **at, captured=1, read_time=2700, phase_error=early) == (
-        2700,
-        True,
-        False,
-        -7,
-    )
+    late = dict(captured=1, read_time=2700, phase_error=5)
+    assert replied(node, 3000, **at, **late) == (2700, True, True, 5)
+    early = dict(captured=1, read_time=2700, phase_error=(1 << 24) - 7)
+    assert replied(node, 3650, **at, **early) == (2700, True, False, -7)
     assert replied(node, 4900, **at, captured=1, read_time=3649)[2] is False
     assert replied(node, 6000, **at, captured=1, read_time=5700)[2] is True
+    assert replied(node, 2**31, **at, read_time=2**31 + 9)[2] is True
     assert replied(node, 2**32 - 100, **at, read_time=2**32 - 90)[2] is True
     assert replied(node, 900, **at, captured=1, read_time=50)[2] is True, "the time has wrapped"

@@ -63,7 +63,7 @@ def test_a_node_that_was_restarted_is_followed_from_its_new_time():
 
 def test_a_tick_that_was_read_before_the_request_belongs_to_the_time_of_its_reading():
     for time in (10**9, 2 * TICK):  # the time wraps between reading and request
-        clock, _ = followed(100)
+        clock, _ = followed(100, start=5 * 10**8)
         driver().node_clock_step(ctypes.byref(clock))
         driver().node_clock_take(ctypes.byref(clock), time, 40, (time - 3 * TICK) % WORD)
         assert clock.now == time
