@@ -108,7 +108,7 @@ class Configuration:
     @property
     def behind_ms(self) -> float:
         """How much later than commanded an axis is at a position, seen from LinuxCNC."""
-        return self.delay_ms + 2 * self.period_ns * 1e-6
+        return self.delay_ms + 2 * self.period_ns * 1e-6 + 1e-3 * (self.capture_us or 0)
 
 
 def backlash_of(row: Table, table: Table) -> tuple[float, float]:
@@ -230,7 +230,7 @@ def load(name: str) -> Configuration:
         raise table.misfit(f"delay_ms {delay:g}: a set-point needs {LEAST_DELAY_MS:g} at least")
     capture = capture_of(table, machine.link_pll)
     table.close()
-    behind = delay + 2 * SERVO_MS
+    behind = delay + 2 * SERVO_MS + 1e-3 * (capture or 0)
     rows = file.rows("axis")
     driven = [row for row in rows if row.left.get("drives")]
     joints: list[Joint] = []

@@ -164,8 +164,11 @@ def test_the_lead_of_the_captures_comes_to_the_set_up(tmp_path):
     found = written(tmp_path, PLL)
     text = Path(found).read_text()
     Path(found).write_text(text.replace("[linuxcnc]", "[linuxcnc]\ncapture_us = 200"))
-    line = texts(load(found))["mill.hal"].split("set_up", 1)[1].splitlines()[0]
+    made = texts(load(found))
+    line = made["mill.hal"].split("set_up", 1)[1].splitlines()[0]
     assert line.endswith(" --capture 200:1000")
+    assert "# the position comes 7.2 ms after the command" in made["mill.ini"]
+    assert made["mill.ini"].count(f"FERROR = {2 * 7.2e-3 * 50:g}") == 2
     Path(found).write_text(text.replace("[linuxcnc]", "[linuxcnc]\ncapture_us = 376"))
     with pytest.raises(Misfit, match="capture_us 376 must be 0 to 375, 3/8 of the period"):
         load(found)
