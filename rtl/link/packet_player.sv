@@ -13,7 +13,8 @@
 //           Entry n of the lists has the address of write n in bits 15:0 and that of read n in bits
 //           31:16; it is stored while enable and busy are low and no capture is made.
 //           With CAPTURES the registers of the read list are read at `capture` too, and while
-//           `hold` is high a reply carries the values of the last capture instead of reading. A
+//           `hold` is high the next reply carries these values instead of reading. No values are
+//           sent twice: a request without a capture since the last one reads the registers. A
 //           request that comes during a capture waits for its end; a capture that comes during a
 //           request, too.
 // limits    writes and reads up to 122; they change only while enable and busy are low
@@ -46,7 +47,7 @@ module packet_player #(
     output logic        busy,        // level: a request is being played or answered
     // captures
     input  wire         capture,     // strobe: read the registers of the read list
-    input  wire         hold,        // level: replies carry the last capture
+    input  wire         hold,        // level: a reply carries a capture, if there is a new one
     output logic        capturing,   // level: they are being read for a capture
     output logic [31:0] read_at,     // cycles, time at which the last reading began; 0 without
     // for the reply
@@ -108,7 +109,7 @@ module packet_player #(
     logic   [ 1:0] number;  // of the byte
     logic [31:0] fetched, reply_word;  // what the memories have read
     logic free, done;
-    logic captured;  // the memory of the reply has the values of a capture
+    logic captured;  // the memory of the reply has the values of a capture for the next reply
     logic captures, plays;  // levels: what begins if the player is idle
     wire  [31:0] crc;
 
@@ -211,7 +212,8 @@ module packet_player #(
             waiting <= (waiting || (start && !busy)) && (state != IDLE || captures);
             if (state == IDLE) capturing <= captures;
             else if (state == FETCH && ends && phase == READS) capturing <= 1'b0;
-            captured <= hold && (captured || (capturing && state == FETCH && ends));
+            if (state == FETCH && ends) captured <= capturing || (captured && phase != HEAD);
+            if (!hold) captured <= 1'b0;
             if (state == FETCH && phase == READS && index == '0) read_at <= now;
             if (rst) begin
                 due       <= 1'b0;

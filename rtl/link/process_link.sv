@@ -7,7 +7,7 @@
 // behaviour A request that passes all checks is played onto the register bus and answered; any
 //           other one changes nothing but its count. The watchdog reports when no request has been
 //           accepted for watchdog_ms. With PLL the read list is also read capture_lead before each
-//           request that is expected, as soon as the arrivals are locked; the reply carries that.
+//           request that is expected, as soon as the arrivals are locked; its reply carries that.
 // source    tables/link.toml: the layout of a packet
 // model     the models of its blocks; tested together by tb/link/test_process_link.py
 `default_nettype none
@@ -35,7 +35,7 @@ module process_link #(
     output logic        busy,          // level: a request is being played or answered
     output logic [47:0] refused,       // counts of 8 bits, in the order of the causes
     output logic        expired,       // level: the watchdog has expired
-    output logic        locked,        // level: the PLL is locked, replies carry captures
+    output logic        locked,        // level: the PLL is locked, captures are made
     output logic [20:0] phase_error,   // cycles, signed: how late the last request was
     output logic        capturing,     // level: the read list is being read for a capture
     output logic [31:0] read_at,       // cycles, when the last reading began; 0 without PLL

@@ -66,7 +66,8 @@ module link_registers (
     // `pll_period`. Change it while `enable` is 0 [cycle]
     output logic       [18:0] capture_lead,
     input  wire               pll_state_built,          // the link has a PLL
-    input  wire               pll_state_locked,         // it is locked: replies carry captures
+    // it is locked: a capture is made before each expected request
+    input  wire               pll_state_locked,
     // as a value of a reply: it was read for a capture, not when the request came
     input  wire               pll_state_captured,
     // how much later than expected the last request came; 0 at the first one [cycle]

@@ -92,11 +92,10 @@ static void count_refused(struct link* link) {
     }
 }
 
-// The latches, before what depends on them. Values that were read before the last access of a
-// latch do not show it yet.
+// The latches, before what depends on them.
 static void take_captures(struct link* link, const uint32_t* words) {
     unsigned axes = link->node.axes;
-    for (unsigned n = 0; n < axes && link->node.fresh; n++)
+    for (unsigned n = 0; n < axes; n++)
         latch_look(&link->latch[n], words[list_word(READ_FEEDBACK_CAPTURE_STATE, axes, n)]);
     if (link->asked < axes)
         latch_answer(&link->latch[link->asked], link->reply.spare,
@@ -123,7 +122,7 @@ static bool take_reply(struct link* link) {
     const uint32_t* words = link->reply.values;
     node_clock_take(&link->clock, of->time, words[READ_NODE_TICK_COUNT.fixed], of->read_time);
     *pins->lateness = link->clock.late / of->clk_hz / MS;
-    *pins->pll_locked = of->captured;
+    *pins->pll_locked = of->locked;
     *pins->pll_phase_error = of->phase_error / of->clk_hz / MS;
     int32_t age = of->captured ? (int32_t)(of->time - of->read_time) : 0;
     *pins->capture_age = age / of->clk_hz / MS;

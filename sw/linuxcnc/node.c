@@ -9,11 +9,11 @@ static const double NS = 1e-9;
 void node_take_time(struct node* node, const struct link_reply* reply) {
     uint32_t pll = reply->values[READ_LINK_PLL_STATE.fixed];
     bool built = FIELD_GET(pll, LINK_PLL_STATE_BUILT);
+    node->locked = FIELD_GET(pll, LINK_PLL_STATE_LOCKED);
     node->captured = FIELD_GET(pll, LINK_PLL_STATE_CAPTURED);
     node->phase_error =
         (int32_t)(pll & LINK_PLL_STATE_PHASE_ERROR_MASK) >> LINK_PLL_STATE_PHASE_ERROR_SHIFT;
     node->read_time = built ? reply->values[READ_LINK_READ_TIME.fixed] : reply->time;
-    node->fresh = !built || (int32_t)(node->read_time - node->time) > 0;
     node->time = reply->time;
     node->time_at = node->sent_at;
 }

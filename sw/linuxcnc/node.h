@@ -26,8 +26,8 @@ struct node {
     double tick;         // cycles of a servo tick
     uint32_t time;       // in the last reply, cycles
     uint32_t read_time;  // at which the values of the last reply were read, cycles
-    bool captured;       // they were read before the request, when the PLL of the node had it done
-    bool fresh;          // they were read after the request before
+    bool locked;         // the PLL of the node follows the requests
+    bool captured;       // it had the values read, before the request
     double phase_error;  // cycles, that a request was later than the PLL of the node expected
     int64_t time_at;     // ns, when the request was sent that it answers
     int64_t sent_at;     // ns, of the last request

@@ -123,7 +123,8 @@ class PacketPlayer:
                     }[n]
                 )
             yield
-            if not self.captured:
+            captured, self.captured = self.captured, 0
+            if not captured:
                 yield from self.read_list(reads)
             words += self.words
             yield

@@ -104,7 +104,7 @@ class Node(ctypes.Structure):
         ("probes", ctypes.c_bool),
         *((name, ctypes.c_double) for name in ("clk_hz", "tick")),
         *((name, ctypes.c_uint32) for name in ("time", "read_time")),
-        *((name, ctypes.c_bool) for name in ("captured", "fresh")),
+        *((name, ctypes.c_bool) for name in ("locked", "captured")),
         ("phase_error", ctypes.c_double),
         *((name, ctypes.c_int64) for name in ("time_at", "sent_at", "patience")),
         ("why", ctypes.c_char * 160),

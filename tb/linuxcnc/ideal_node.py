@@ -246,7 +246,7 @@ class IdealNode:
             "link",
             "pll_state",
             built=self.has_pll,
-            locked=self.captured is not None,
+            locked=self.locked,
             captured=self.captures,
         )
         for n, axis in enumerate(self.axes):
@@ -326,12 +326,16 @@ class IdealNode:
     def advance(self, cycles: int) -> None:
         """The node runs until the next request, and captures its values before."""
         end = self.time + cycles
-        if self.session and self.period:
+        if self.locked:
             self._run(end - self.lead)
             self.captures = True
             self.captured = self._read_list()
             self.captures = False
         self._run(end)
+
+    @property
+    def locked(self) -> bool:
+        return bool(self.session and self.period)
 
     def _read_list(self) -> list[int]:
         self.read_time = self.time
@@ -411,6 +415,7 @@ class IdealNode:
         for n, value in enumerate(words[layout.REQUEST_WORDS : layout.REQUEST_WORDS + self.writes]):
             self.write(self.lists[n] & 0xFFFF, value)
         values = self._read_list() if self.captured is None else self.captured
+        self.captured = None
         spare, spare_value = words[-3], words[-2]
         read = 0 if spare >> 31 else self.read(spare & 0xFFFF)
         if spare >> 31:

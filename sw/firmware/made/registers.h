@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x86ba2279u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xc4a68325u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -810,7 +810,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINK_PLL_STATE_BUILT_MASK 0x00000001u
 #define LINK_PLL_STATE_BUILT_SHIFT 0
 #define LINK_PLL_STATE_BUILT_WIDTH 1
-// it is locked: replies carry captures
+// it is locked: a capture is made before each expected request
 #define LINK_PLL_STATE_LOCKED_MASK 0x00000002u
 #define LINK_PLL_STATE_LOCKED_SHIFT 1
 #define LINK_PLL_STATE_LOCKED_WIDTH 1

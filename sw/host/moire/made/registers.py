@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x86BA2279  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xC4A68325  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -940,7 +940,7 @@ FIELDS = (
         "link", "pll_state", "locked",
         0x38, 1, 1, False, "r", "",
         Fraction(1, 1),
-        "it is locked: replies carry captures",
+        "it is locked: a capture is made before each expected request",
     ),
     Field(
         "link", "pll_state", "captured",
