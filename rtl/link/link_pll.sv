@@ -13,6 +13,7 @@
 //           falls by 3 with another one. `locked` rises with one more such error at 63. It falls
 //           when the score falls to 0, or when 16 arrivals in a row are missing; then the next
 //           arrival starts from scratch. While fewer are missing, the period runs on as it was.
+//           While it is off, no register changes.
 // limits    A period has from 2048 cycles up to 2^20 - 1; `lead` is 3/8 of it at most. Both change
 //           only while enable is low, or with a pause of 16 periods. Arrivals that jitter by more
 //           than about 30 % of the period, either way, do not lock.
@@ -59,7 +60,7 @@ module link_pll (
     // the period ends half a period after the expected arrival
     wire [20:0] half = {2'b00, period[19:1]};
     wire [20:0] next = phase + 21'd1;
-    wire wraps = $signed(next) >= $signed(half);
+    wire wraps = on && $signed(next) >= $signed(half);
 
     // Correction of the next period. A late arrival makes it longer: it begins earlier.
     wire  [31:0] sum = {{4{trim[27]}}, trim} + {14'd0, fraction}

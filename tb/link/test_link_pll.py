@@ -14,6 +14,7 @@ from tb.bench import run, seed, start
 from tb.link.link_pll import FULL, GAIN, NAMES, PATIENCE, LinkPll
 
 PERIOD, LEAD = 2048, 400
+REGISTERS = ("phase", "trim", "fraction", "score", "missed", "runs", "seen", "error", "locked")
 
 
 class Bench:
@@ -147,8 +148,16 @@ async def without_enable_or_period_nothing_is_captured(dut):
         await bench.clk(**off)
         assert not int(dut.locked.value)
         bench.captures.clear()
+        bench.levels |= off
+        await bench.clk(arrived=1)
+        shown = [getattr(dut, name) for name in REGISTERS if hasattr(dut, name)]  # not in a netlist
+        before = [int(register.value) for register in shown]
+        for _ in range(50):
+            await bench.clk()
+            assert [int(register.value) for register in shown] == before
         await bench.idle(3 * PERIOD)
         assert not bench.captures
+        bench.levels |= {"enable": 1, "period": PERIOD}
         await bench.lock(first=bench.cycle + 5)
         assert bench.captures
 
