@@ -57,7 +57,7 @@ SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
 # missing here costs time only; tb/twin/test_rising_edge.py sees it.
 COUNTERS = (
     r"u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|u_core_wait__\w+|u_engine__DOT__elapsed|"
-    r"u_lines__\w+|u_filter__DOT__(?:skipped|due)|since"
+    r"u_lines__\w+|u_filter__DOT__(?:skipped|due)|u_watchdog__DOT__part|since"
 )
 SOFT_CORE = r"u_core__\w+"
 SELDOM = re.compile(r"__DOT__master_(?:address|wdata)$")  # they are 0 but for an access of the core
