@@ -174,17 +174,22 @@ class Program:
 
     def errors(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
         """Distances in mm of a path from the program while it was followed, and the path after
-        that. The path comes to the start, and rests at the end for REST rows at least, that is, it
-        moves by less than still_mm; ValueError if it does not do so in this order.
+        that; ValueError as from `followed`.
+        """
+        part, after = self.followed(path, still_mm)
+        return numpy.min([move.distances(part) for move in self.moves], axis=0), after
+
+    def followed(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
+        """The part of a path that followed the program, and the path after that. The path comes to
+        the start, and rests at the end for REST rows at least, that is, it moves by less than
+        still_mm; ValueError if it does not do so in this order.
         """
         resting = numpy.linalg.norm(path[REST:] - path[:-REST], axis=1) < still_mm
         near = first(at(path, self.start, CLOSE_MM), 0, "the start")
         moved = first(~at(path, self.start), near, "a motion")
         ended = first(resting & at(path, self.place), moved, "the end")
         began = near + int(numpy.argmin(numpy.linalg.norm(path[near:moved] - self.start, axis=1)))
-        part = path[began:ended]
-        distances = numpy.min([move.distances(part) for move in self.moves], axis=0)
-        return distances, path[ended:]
+        return path[began:ended], path[ended:]
 
 
 def at(path: Points, place: Point, within_mm: float = NEAR_MM) -> NDArray[numpy.bool_]:
@@ -205,6 +210,26 @@ def circle(centre: tuple[float, float], radius: float, z: float, feed: float) ->
     """A full circle, from its leftmost point."""
     x, y = centre
     return Program((x - radius, y, z), feed).arc(x, y, -math.tau)
+
+
+def both_ways(centre: tuple[float, float], radius: float, z: float, feed: float) -> Program:
+    """A circle as a ball bar runs it: one and a half turns counterclockwise, and back."""
+    x, y = centre
+    once = Program((x - radius, y, z), feed).arc(x, y, 1.5 * math.tau)
+    return once.arc(x, y, -1.5 * math.tau)
+
+
+def turns_of(part: Points, centre: tuple[float, float]) -> tuple[Points, Points]:
+    """The full turns, counterclockwise and clockwise, of a path that followed `both_ways`, without
+    the quarters before and after each of them: rows of X, Y from the centre.
+    """
+    found: Points = part[:, :2] - centre
+    angle = numpy.unwrap(numpy.arctan2(found[:, 1], found[:, 0]))
+    angle -= angle[0]
+    back = int(numpy.argmax(angle))
+    within = (angle > 0.25 * math.tau) & (angle < 1.25 * math.tau)
+    rows = numpy.arange(len(angle))
+    return found[within & (rows < back)], found[within & (rows > back)]
 
 
 def pocket(corner: tuple[float, float], size: float, step: float, z: float, feed: float) -> Program:
@@ -281,6 +306,8 @@ PROGRAMS = {
     "corners": corners((5, 5, 2), 2, 0.05, 900),
     "surface": SURFACE.program([(24, 4), (26, 4), (25, 6)], 3, 120),
 }
+BALL_BAR = (15.0, 10.0)  # centre of the circles of a test by ISO 230-4
+BALL_BAR_MM, BALL_BAR_FEED = 5.0, 600
 # short ones, near the zero
 SHORT_PROGRAMS = {
     "small": circle((1.5, 1.5), 1, 0.5, 600),
