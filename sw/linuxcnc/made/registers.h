@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#define MAP_CRC 0xa49b4ceau
+#define MAP_CRC 0xdc994000u
 #define NODE_BASE 0x000u
 #define LINK_BASE 0x300u
 #define AXIS_BASE 0x400u
