@@ -306,8 +306,6 @@ PROGRAMS = {
     "corners": corners((5, 5, 2), 2, 0.05, 900),
     "surface": SURFACE.program([(24, 4), (26, 4), (25, 6)], 3, 120),
 }
-BALL_BAR = (15.0, 10.0)  # centre of the circles of a test by ISO 230-4
-BALL_BAR_MM, BALL_BAR_FEED = 5.0, 600
 # short ones, near the zero
 SHORT_PROGRAMS = {
     "small": circle((1.5, 1.5), 1, 0.5, 600),
