@@ -3,9 +3,11 @@
 node, with its compensation of backlash and without it, and by LinuxCNC's own pid over a card for
 step and direction. The machines are the same, and the true path of their tables is judged.
 
-    python -m linuxcnc_config.ball_bar --picture ball_bar.png
+    python -m linuxcnc_config.ball_bar
+    python -m linuxcnc_config.ball_bar --record docs
     python -m linuxcnc_config.ball_bar --tune
 
+`--record` writes ball_bar.toml, of which the table in docs/linuxcnc.md is made, and ball_bar.png.
 `--tune` changes each gain of the pid, one after the other, and prints what the circle becomes: how
 the gains here were found, and that none of their neighbours is better. It needs LinuxCNC
 (`make linuxcnc`) and root.
@@ -37,6 +39,11 @@ NAME = "circle.ngc"
 GAINS = Gains(p=70, i=0, ff1=1, ff2=0.0007)
 STEPS = {"p": 15.0, "i": 300.0, "d": 0.02, "ff1": 0.01, "ff2": 0.0004, "deadband_um": 0.6}  # --tune
 
+HEAD = """\
+# SPDX-License-Identifier: Apache-2.0
+# Circles of the simulated mill by ISO 230-4, in um. Written by `python -m linuxcnc_config.ball_bar
+# --record docs` alone; the table in docs/linuxcnc.md is made from it by `make tables`.
+"""
 NODE, UNCOMPENSATED, PID = "node", "node, backlash not compensated", "LinuxCNC's pid"
 UNCOMPENSATED_MILL = replace(MILL, backlash=None)
 
@@ -89,19 +96,31 @@ def circle(variant: str, seed: int = 1, short: bool = False) -> Circle:
     return judged(VARIANTS[variant]({NAME: program.text()}, seed), program, centre, radius)
 
 
+def results(found: Circle) -> dict[str, float]:
+    """{result: um}"""
+    values = {
+        "deviation": found.deviation,
+        "counterclockwise": found.deviations[0],
+        "clockwise": found.deviations[1],
+        "hysteresis": found.hysteresis,
+        "radial": found.radial_deviation,
+        "rms": found.rms,
+    }
+    return {name: round(1000 * value, 2) for name, value in values.items()}
+
+
 def line_of(name: str, found: Circle) -> str:
     """The results in a line."""
-    one, other = found.deviations
-    return (
-        f"{name}: G(b) {1000 * found.deviation:.2f} um, G {1000 * one:.2f} um counterclockwise, "
-        f"{1000 * other:.2f} um clockwise, H {1000 * found.hysteresis:.2f} um, "
-        f"F {1000 * found.radial_deviation:.2f} um"
-    )
+    return f"{name}: " + ", ".join(f"{what} {value:g} um" for what, value in results(found).items())
 
 
-def picture(variants: Sequence[str] = tuple(VARIANTS), seed: int = 1) -> bytes:
-    """The circles side by side, as PNG."""
-    return circles({name: circle(name, seed) for name in variants}, factor=1000)
+def record(found: Mapping[str, Circle], folder: Path) -> None:
+    """Writes the results and the diagrams of one run into a folder."""
+    lines = [HEAD]
+    for name, one in found.items():
+        lines += [f'["{name}"]', *(f"{key} = {value}" for key, value in results(one).items()), ""]
+    (folder / "ball_bar.toml").write_text("\n".join(lines), encoding="utf-8")
+    (folder / "ball_bar.png").write_bytes(circles(found, factor=1000))
 
 
 def tune(seed: int = 1) -> None:
@@ -126,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m linuxcnc_config.ball_bar",
         description="A circle of the simulated mill by ISO 230-4, with LinuxCNC.",
     )
-    parser.add_argument("--picture", type=Path, help="write the diagrams into this PNG")
+    parser.add_argument("--record", type=Path, help="folder for ball_bar.toml and ball_bar.png")
     parser.add_argument("--tune", action="store_true", help="the neighbours of the pid's gains")
     parser.add_argument("--seed", type=int, default=1, help="of the machine (1)")
     options = parser.parse_args(arguments)
@@ -136,10 +155,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.tune:
         tune(options.seed)
         return 0
+    found = {}
     for name in VARIANTS:
-        print(line_of(name, circle(name, options.seed)), flush=True)
-    if options.picture:
-        options.picture.write_bytes(picture(seed=options.seed))
+        found[name] = circle(name, options.seed)
+        print(line_of(name, found[name]), flush=True)
+    if options.record:
+        record(found, options.record)
     return 0
 
 

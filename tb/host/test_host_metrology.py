@@ -153,6 +153,7 @@ def test_an_oval_has_its_range_as_circular_deviation_and_no_hysteresis():
     assert test.deviations == pytest.approx((0.006, 0.006), rel=1e-4)
     assert test.radial_deviation == pytest.approx(0.003, rel=1e-4)
     assert test.hysteresis == 0 and abs(test.centre).max() < 1e-9
+    assert test.rms == pytest.approx(0.003 / math.sqrt(2), rel=1e-4)
 
 
 def test_a_shifted_circle_is_round_but_deviates_from_the_programmed_one():

@@ -262,6 +262,14 @@ class Circle:
         return float(abs(one - other).max())
 
     @property
+    def rms(self) -> float:
+        """The root mean square of the distances of both paths from the circle that fits best; not
+        in the standard, but no single point decides it.
+        """
+        points = numpy.concatenate(self.paths) - self.centre
+        return float(numpy.std(numpy.linalg.norm(points, axis=1)))
+
+    @property
     def radial_deviation(self) -> float:
         """The radial deviation F, the largest one of both paths without its sign: from the
         programmed circle around its programmed centre.
