@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Threads that LinuxCNC cuts on the simulated lathe: how the true path of its table follows the true
-angle of its spindle.
+"""Threads that LinuxCNC cuts on the simulated lathe: how the true path of its table follows the
+true angle of its spindle.
 """
 
 import tempfile

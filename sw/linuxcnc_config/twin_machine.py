@@ -24,6 +24,7 @@ from moire.analysis.tune import COEFFICIENT, notch
 from moire.bus.link_gateway import LinkGateway
 from moire.client.bus import Bus
 from moire.client.values import FILTER
+from moire.errors import MoireError
 from moire.units import Value
 from twin import Twin, TwinTransport, build
 from twin.nodes.twin import ALL_AXES, NODE, Axis, Node
@@ -34,6 +35,7 @@ SESSION = 0x4D1
 PARTS = 8  # of a period, at whose ends the positions are recorded
 TICK_S = 0.25e-3  # of the servo
 LSB = 1 << 16  # of a position, in a signal period
+READINGS, RESTING_MM = 50, 0.1e-3  # of a table at rest, which may make a step meanwhile
 SPINDLE_LINES, SPINDLE_TURNS_S = 1024, 5.0
 # LinuxCNC follows the spindle by stretches of its largest acceleration, and hunts by about that
 # times the square of its period: 8 um at 500 mm/s2 and 4 ms, 0.5 um at the usual 1 ms
@@ -195,13 +197,18 @@ class TwinMachine:
 
     def zero_mm(self, number: int) -> float:
         """The true position of the zero of an axis, which is a whole number of periods away from
-        where the model has a zero.
+        where the model has a zero. It is found while the table rests: reading the count takes time.
+        MoireError if it does not rest.
         """
         period = self.plant.configuration.axes[number].period_um * 1e-3
-        count = self.node.read_named("axis.position", number)["value"]
-        apart = self.twin.machine(number).state.position_m * 1e3 - count / LSB * period
-        apart -= self.model_zero_mm
-        return float(self.model_zero_mm + round(apart / period) * period)
+        for _ in range(READINGS):
+            before = self.twin.machine(number).state.position_m * 1e3
+            count = self.node.read_named("axis.position", number)["value"]
+            after = self.twin.machine(number).state.position_m * 1e3
+            if abs(after - before) < RESTING_MM:
+                apart = after - count / LSB * period - self.model_zero_mm
+                return float(self.model_zero_mm + round(apart / period) * period)
+        raise MoireError(f"axis {number} does not rest")
 
     def true_path(self) -> Points:
         """Rows of X, Y, Z in mm, true positions of the tables, from the zeros; 0 without an axis.
