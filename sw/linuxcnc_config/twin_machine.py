@@ -69,13 +69,21 @@ class Plant:
     spindle_settings: Mapping[str, Value] = field(default_factory=dict)
 
 
+CONFIGURATION = load("mill_linuxcnc")
+SCREW = CONFIGURATION.axes[0]
 MILL = Plant(
-    load("mill_linuxcnc"),
+    CONFIGURATION,
     replace(SCALE.machine(), parameters=SCALE.machine().parameters | START_M),
     "steps_stream",
     {**STEPPERS, "HAS_BACKLASH": ALL_AXES},
-    {**SCALE.settings(), "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"},
-    ("5um", "1mm/s", "0.25um"),
+    {
+        **SCALE.settings(),
+        "ki": 0.0002,  # half of that of S2: the table rings less after a reversal
+        "home_offset": 0,
+        "travel_low": "-2mm",
+        "travel_high": "150mm",
+    },
+    (f"{SCREW.backlash}um", f"{SCREW.take_up}mm/s", f"{SCREW.hysteresis}um"),
     SURFACE,
 )
 DRIVEN = 0b11  # axes of the lathe

@@ -36,7 +36,6 @@ from linuxcnc_config.programs import (
     threaded,
 )
 from linuxcnc_config.set_up import set_up
-from linuxcnc_config.threads import cut
 from tb.linuxcnc.ideal_node import CLK_HZ, STREAMING, TICK, IdealAxis, IdealNode, Served
 
 SESSION = 0x4D01
@@ -252,12 +251,6 @@ def test_g33_and_each_pass_of_g76_follow_the_spindle_in_the_same_groove(day):
     assert within < 1e-3 and apart < 1e-3
     count, rawcounts = day.pins(COUNTS)
     assert count > 0 and (rawcounts - count) % (4 * PERIODS_PER_TURN) == 0, "0 at an index"
-
-
-def test_threads_on_the_twin_follow_the_true_angle_of_its_spindle():
-    pitch, apart = cut()
-    print(f"pitch error {1000 * pitch:.3f} um, passes {1000 * apart:.3f} um apart")
-    assert 1e-4 < pitch < 3e-3 and apart < 1e-3, "mm: a stepper on a scale of 1 um"
 
 
 def test_feed_override_hold_and_lost_packets_stay_on_the_circle(day):
