@@ -88,7 +88,8 @@ static bool as_realtime(void) {
     volatile char stack[STACK];
     for (size_t n = 0; n < sizeof stack; n++) stack[n] = 0;
     struct sched_param priority = {.sched_priority = PRIORITY};
-    return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 && sched_setscheduler(0, SCHED_FIFO, &priority) == 0;
+    return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 &&
+           sched_setscheduler(0, SCHED_FIFO, &priority) == 0;
 }
 
 static double spun_us(double length_us) {

@@ -102,7 +102,7 @@ class Card:
             self.fill(modules, [word, base | registers << 16, multiple])
             modules += 12
         self.fill(modules, [0])
-        named = {}
+        named: dict[int, tuple[int, int, int]] = {}
         for n in range(axes):
             named |= {2 * n + pin: (OUTPUT | 1 + pin, TAG_STEPS, n) for pin in range(2)}
             named |= {PORT_PINS + 3 * n + pin: (1 + pin, TAG_COUNTER, n) for pin in range(3)}
@@ -191,14 +191,14 @@ class Card:
 
     def write_space(self, space: int, address: int, data: bytes) -> None:
         if space == SPACE_REGISTERS:
-            self.write(address, struct.unpack("<I", data)[0])
+            self.write(address, int.from_bytes(data, "little"))
         else:
             self.spaces[space][address : address + len(data)] = data
 
 
 def checksum(header: bytes) -> int:
     """Of an IP header without one."""
-    total = sum(struct.unpack(f"!{len(header) // 2}H", header))
+    total: int = sum(struct.unpack(f"!{len(header) // 2}H", header))
     total = (total & 0xFFFF) + (total >> 16)
     return ~((total & 0xFFFF) + (total >> 16)) & 0xFFFF
 

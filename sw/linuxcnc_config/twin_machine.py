@@ -101,8 +101,10 @@ LATHE = replace(
         ],
         spindle=Spindle("S", SPINDLE_LINES),
     ),
-    parameters=MILL.parameters
-    | {name: DRIVEN for name in ("HAS_DRIVE", "HAS_STEPPER", "HAS_BACKLASH", "HAS_SET_POINTS")},
+    parameters={
+        **MILL.parameters,
+        **dict.fromkeys(("HAS_DRIVE", "HAS_STEPPER", "HAS_BACKLASH", "HAS_SET_POINTS"), DRIVEN),
+    },
     surface=None,
     spindle=Axis("spindle", {"drive_speed": SPINDLE_TURNS_S, "encoder_lines": SPINDLE_LINES}),
     spindle_settings={"counts_per_period": 4, "position_source": 1, "deglitch": 0},

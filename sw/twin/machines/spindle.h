@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A spindle that runs by a drive of its own, with an encoder: A/B, and Z for one count in each turn.
+// A spindle that runs by a drive of its own, with an encoder: A/B, and Z for one count in each
+// turn.
 //
 //   d speed/dt = (demanded - speed) / settle
 //   d angle/dt = speed (1 + unevenness cos(order angle))
@@ -16,9 +17,7 @@ class Spindle : public Machine {
     const char* faults() const override { return "encoder_cut a_stuck b_stuck z_stuck"; }
     void set_position(double where) override { angle_ = where; }
     void push(double) override {}
-    const char* state_names() const override {
-        return "time_s turns speed_rev_s a? b? z? counts#";
-    }
+    const char* state_names() const override { return "time_s turns speed_rev_s a? b? z? counts#"; }
     void state(uint64_t now, double* out) const override;
 
  protected:

@@ -14,7 +14,7 @@
 
 namespace twin {
 
-struct StepCard {  // in the order of machine.py
+struct StepCard {             // in the order of machine.py
     int64_t accumulator = 0;  // steps, Q31.32
     int64_t emitted = 0;      // pulses, by direction
     int64_t count = 0;        // edges of A and B, by direction

@@ -96,7 +96,6 @@ def circles(tests: Mapping[str, Circle], unit: str = "\N{MICRO SIGN}m", factor: 
                 label=words,
             )
         panel.set_ylim(-2 * most, most)
-        panel.set_rlabel_position(22.5)
         panel.tick_params(labelsize=7)
         panel.set_title(f"{name}\nG(b) = {factor * test.deviation:.3g} {unit}", fontsize=9)
     figure.supxlabel(f"radial deviation / {unit}", fontsize=9)
