@@ -76,13 +76,7 @@ MILL = Plant(
     replace(SCALE.machine(), parameters=SCALE.machine().parameters | START_M),
     "steps_stream",
     {**STEPPERS, "HAS_BACKLASH": ALL_AXES},
-    {
-        **SCALE.settings(),
-        "ki": 0.0002,  # half of that of S2: the table rings less after a reversal
-        "home_offset": 0,
-        "travel_low": "-2mm",
-        "travel_high": "150mm",
-    },
+    {**SCALE.settings(), "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"},
     (f"{SCREW.backlash}um", f"{SCREW.take_up}mm/s", f"{SCREW.hysteresis}um"),
     SURFACE,
 )
