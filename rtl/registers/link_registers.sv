@@ -57,7 +57,9 @@ module link_registers (
     input  wire        [ 7:0] refused_now_out_of_time,
     // packets refused for their moment; each count wraps at 256: busy
     input  wire        [ 7:0] refused_now_busy,
-    // strobe: bytes without a stop bit; writing clears the count, which stops at its largest value
+    // strobe: losses on the carrier: serial, bytes without a stop bit; SPI, transfers that ended
+    // within the request or the reply; 0 for UDP, where a damaged datagram counts as a refused
+    // packet. Writing clears the count
     input  wire               framing_errors,
     // PLL: time from one request to the next, as the host has set it, at least 2048 cycles; 0: off.
     // Change it while `enable` is 0 [cycle]

@@ -88,7 +88,7 @@ module node_registers (
     assign scope_word_read = get_scope_word;
 
     // words read in the cycle before
-    assign rdata = ({32{get_map_crc}} & 32'hC4A68325) | ({32{get_clk_hz}} & clk_hz) |
+    assign rdata = ({32{get_map_crc}} & 32'hC9C30AB0) | ({32{get_clk_hz}} & clk_hz) |
         ({32{get_build}} & {7'd0, build_scope, build_memory, build_address, build_axes}) |
         ({32{get_time_stamp}} & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high) |
         ({32{get_tick_count}} & tick_count) | ({32{get_scope_state}} & {13'd0,

@@ -2,20 +2,29 @@
 // thread_bench.c -- the driver's read and write functions, called as the servo thread calls
 // them, without LinuxCNC: how much processor time they take. A thread of its own answers as a node.
 //
-//     thread_bench PERIODS AXES        prints the median and the largest time of read + write,
-//     us
+//     thread_bench PERIODS AXES
+//
+// It runs as the realtime threads of LinuxCNC do: SCHED_FIFO, memory locked, on the last processor.
+// It prints, in us, the median and the largest time of read + write, and the largest time of a loop
+// that does nothing for as long as the median, once after each period: what the machine itself
+// takes from a thread by interrupts and, if it is virtual, by its host. Then the number of page
+// faults of the thread in all periods.
 #include "bench_hal.h"
 
 #include <pthread.h>
 #include <arpa/inet.h>
 #include <errno.h>
 #include <poll.h>
+#include <sched.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include "moire.c"
 
 enum { CLK_HZ = 60000000, TICK = 15000, STREAMING = 2, SERVO_NS = 1000000, WARM = 100 };
+enum { PRIORITY = 90, STACK = 1 << 16 };
 
 static uint32_t register_of(uint32_t address) {
     switch (address) {
@@ -67,6 +76,33 @@ static int by_size(const void* a, const void* b) {
     return (difference > 0) - (difference < 0);
 }
 
+static void on_processor(pthread_t thread, long number) {
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET((size_t)number, &one);
+    pthread_setaffinity_np(thread, sizeof one, &one);
+}
+
+// As rtapi_app: a page that is not there yet would be a fault within the servo thread.
+static bool as_realtime(void) {
+    volatile char stack[STACK];
+    for (size_t n = 0; n < sizeof stack; n++) stack[n] = 0;
+    struct sched_param priority = {.sched_priority = PRIORITY};
+    return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 &&
+           sched_setscheduler(0, SCHED_FIFO, &priority) == 0;
+}
+
+static double spun_us(double length_us) {
+    double begin = used_us(), now = begin;
+    while (now - begin < length_us) now = used_us();
+    return now - begin;
+}
+
+static double median_of(double* times, size_t count) {
+    qsort(times, count, sizeof *times, by_size);
+    return times[count / 2];
+}
+
 int main(int count, char** words) {
     if (count != 3) return 2;
     size_t periods = (size_t)atol(words[1]);
@@ -84,23 +120,38 @@ int main(int count, char** words) {
     pthread_create(&thread, NULL, answer, &file);
     if (rtapi_app_main()) return 1;
     for (int n = 0; n < axes[0]; n++) *links->axis[n].pins.scale = 250;
-    mlockall(MCL_CURRENT | MCL_FUTURE);
-    double* times = calloc(periods, sizeof *times);
+    long last = sysconf(_SC_NPROCESSORS_ONLN) - 1;
+    on_processor(pthread_self(), last);
+    on_processor(thread, last > 0 ? last - 1 : 0);
+    double *times = calloc(periods + WARM, sizeof *times), empty = 0, length_us = 0;
+    if (!as_realtime()) {
+        fprintf(stderr, "a thread with SCHED_FIFO and locked memory needs root\n");
+        return 1;
+    }
+    struct rusage before, after;
     for (size_t n = 0; n < periods + WARM; n++) {
         struct pollfd reply = {.fd = links->node.carrier.file, .events = POLLIN};
         if (n) poll(&reply, 1, 1000);
-        double before = used_us();
+        if (n == WARM) {
+            length_us = median_of(times, WARM);
+            getrusage(RUSAGE_THREAD, &before);
+        }
+        double begin = used_us();
         functions[0](arguments[0], SERVO_NS);
         functions[1](arguments[1], SERVO_NS);
-        if (n >= WARM) times[n - WARM] = used_us() - before;
+        times[n] = used_us() - begin;
+        double spun = n < WARM ? 0 : spun_us(length_us);
+        if (spun > empty) empty = spun;
         for (int one = 0; one < axes[0] && n == 1; one++) {
             *links->axis[one].pins.enable = 1;
             links->axis[one].phase = FOLLOWING;
         }
     }
+    getrusage(RUSAGE_THREAD, &after);
     for (int n = 0; n < axes[0]; n++)
         if (links->axis[n].phase != FOLLOWING) return 1;
-    qsort(times, periods, sizeof *times, by_size);
-    printf("%.3f %.3f\n", times[periods / 2], times[periods - 1]);
+    double median = median_of(times + WARM, periods);
+    printf("%.3f %.3f %.3f %ld\n", median, times[WARM + periods - 1], empty,
+           after.ru_minflt - before.ru_minflt + after.ru_majflt - before.ru_majflt);
     return *links->pins.packet_error_total != 0;
 }

@@ -9,9 +9,10 @@ MACHINE is a machine of constraints/machines, or a .toml file. docs/linuxcnc.md 
 
 import random
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import jinja2
 
@@ -48,6 +49,7 @@ class Joint:
     sensor: str = "table"  # the side of the backlash on which the sensor is, or "motor"
     gantry: str = ""  # the axis whose second side it is
     apart: float = 0.0  # most that its position may differ from that of the other side
+    latch: float = 0.0  # velocity at which LinuxCNC itself searches the index; 0: the node homes
 
     @property
     def letter(self) -> str:
@@ -258,8 +260,8 @@ def load(name: str) -> Configuration:
     )
 
 
-def texts(found: Configuration) -> dict[str, str]:
-    """{file name: text} of a configuration."""
+def rendered(name: str, values: Mapping[str, Any]) -> str:
+    """The text of a template."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         undefined=jinja2.StrictUndefined,
@@ -267,6 +269,11 @@ def texts(found: Configuration) -> dict[str, str]:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    return environment.get_template(f"{name}.jinja").render(values)
+
+
+def texts(found: Configuration) -> dict[str, str]:
+    """{file name: text} of a configuration."""
     values = {
         **{key: getattr(found, key) for key in Configuration.__dataclass_fields__},
         "session": found.session or random.SystemRandom().randint(1, LONGEST_SESSION),
@@ -278,10 +285,7 @@ def texts(found: Configuration) -> dict[str, str]:
         "velocity": max(axis.velocity for axis in found.axes),
         "screen": found.display == "axis",
     }
-    return {
-        f"{found.name}.{kind}": environment.get_template(f"machine.{kind}.jinja").render(values)
-        for kind in ("ini", "hal")
-    }
+    return {f"{found.name}.{kind}": rendered(f"machine.{kind}", values) for kind in ("ini", "hal")}
 
 
 OWN = {  # files that belong to the user: written only where there are none

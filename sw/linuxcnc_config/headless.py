@@ -96,10 +96,15 @@ def run(
     folder: Path,
     steps: Sequence[Sequence[Any]],
     programs: Mapping[str, str] | None = None,
+    hal: str | None = None,
+    within: Sequence[str] = (),
 ) -> Run:
     """Runs LinuxCNC with a configuration, which is written into the folder; `steps` of the operator
-    and the G-code of the `programs` by file name."""
+    and the G-code of the `programs` by file name. `hal` is the text of another HAL file than that
+    of a node, and `within` are words before the command, such as those of another namespace."""
     ini = write(replace(found, display=f"./{OPERATOR.name}"), folder)
+    if hal is not None:
+        ini.with_suffix(".hal").write_text(hal, encoding="utf-8")
     shutil.copy(OPERATOR, folder)
     with_own_port(ini)
     for name, text in (programs or {}).items():
@@ -124,7 +129,7 @@ def run(
             env -u DISPLAY HOME={PRIVATE}/home LANG=C linuxcnc -r {shlex.quote(ini.name)}
     """
     ran = subprocess.run(
-        [*PRIVATELY, "sh", "-c", script],
+        [*within, *PRIVATELY, "sh", "-c", script],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

@@ -20,6 +20,8 @@ BEFORE_MM, SETTLING_FEED = 0.05, 20  # 0.15 s
 TOUCHED = "touched.txt"  # rows of the positions of all axes
 PAST_MM = 0.2  # below a surface, where a touch ends at the latest
 DWELL, FIRST_LINE = "G4 P0.1", 8
+PASSES = 3  # of G76 in a thread of these programs
+CATCH_UP_S, SMOOTH_S = 0.05, 5e-3  # of a thread: until Z follows the spindle, and of its speed
 
 Points = NDArray[numpy.float64]  # n rows of X, Y, Z
 Point = tuple[float, float, float]
@@ -169,22 +171,28 @@ class Program:
             DWELL,
             "M2",
         ]
+        missing = "".join(sorted(set("XYZ") - set(letters)))
         text = "\n".join(lines) + "\n"
-        return text if "Z" in letters else re.sub(" Z[-.0-9]+", "", text)
+        return re.sub(f" [{missing}][-.0-9]+", "", text) if missing else text
 
     def errors(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
         """Distances in mm of a path from the program while it was followed, and the path after
-        that. The path comes to the start, and rests at the end for REST rows at least, that is, it
-        moves by less than still_mm; ValueError if it does not do so in this order.
+        that; ValueError as from `followed`.
+        """
+        part, after = self.followed(path, still_mm)
+        return numpy.min([move.distances(part) for move in self.moves], axis=0), after
+
+    def followed(self, path: Points, still_mm: float = STILL_MM) -> tuple[Points, Points]:
+        """The part of a path that followed the program, and the path after that. The path comes to
+        the start, and rests at the end for REST rows at least, that is, it moves by less than
+        still_mm; ValueError if it does not do so in this order.
         """
         resting = numpy.linalg.norm(path[REST:] - path[:-REST], axis=1) < still_mm
         near = first(at(path, self.start, CLOSE_MM), 0, "the start")
         moved = first(~at(path, self.start), near, "a motion")
         ended = first(resting & at(path, self.place), moved, "the end")
         began = near + int(numpy.argmin(numpy.linalg.norm(path[near:moved] - self.start, axis=1)))
-        part = path[began:ended]
-        distances = numpy.min([move.distances(part) for move in self.moves], axis=0)
-        return distances, path[ended:]
+        return path[began:ended], path[ended:]
 
 
 def at(path: Points, place: Point, within_mm: float = NEAR_MM) -> NDArray[numpy.bool_]:
@@ -205,6 +213,26 @@ def circle(centre: tuple[float, float], radius: float, z: float, feed: float) ->
     """A full circle, from its leftmost point."""
     x, y = centre
     return Program((x - radius, y, z), feed).arc(x, y, -math.tau)
+
+
+def both_ways(centre: tuple[float, float], radius: float, z: float, feed: float) -> Program:
+    """A circle as a ball bar runs it: one and a half turns counterclockwise, and back."""
+    x, y = centre
+    once = Program((x - radius, y, z), feed).arc(x, y, 1.5 * math.tau)
+    return once.arc(x, y, -1.5 * math.tau)
+
+
+def turns_of(part: Points, centre: tuple[float, float]) -> tuple[Points, Points]:
+    """The full turns, counterclockwise and clockwise, of a path that followed `both_ways`, without
+    the quarters before and after each of them: rows of X, Y from the centre.
+    """
+    found: Points = part[:, :2] - centre
+    angle = numpy.unwrap(numpy.arctan2(found[:, 1], found[:, 0]))
+    angle -= angle[0]
+    back = int(numpy.argmax(angle))
+    within = (angle > 0.25 * math.tau) & (angle < 1.25 * math.tau)
+    rows = numpy.arange(len(angle))
+    return found[within & (rows < back)], found[within & (rows > back)]
 
 
 def pocket(corner: tuple[float, float], size: float, step: float, z: float, feed: float) -> Program:
@@ -263,6 +291,45 @@ def threaded(start: Point, z: float, pitch: float, turns_s: float) -> Program:
     return found.thread(*start[:2], z, pitch)
 
 
+def passes_text(place: Point, z: float, pitch: float, turns_s: float, letters: str = "XYZ") -> str:
+    """The G-code of a thread that G76 cuts in PASSES passes, in the plane of a lathe: from a place
+    to z, with the spindle, which runs already."""
+    begin = " ".join(f"{name}{at:g}" for name, at in zip("XYZ", place) if name in letters)
+    return f"""G21 G90 G18 G40 G49 G61
+S{60 * turns_s:g} M3
+G0 {begin}
+G76 P{pitch:g} Z{z:g} I-1 J0.2 K0.6 R1 Q0 H0 E0 L0
+M5
+M2
+"""
+
+
+def grooves_of(
+    turns: Points, z: Points, pitch: float, turns_s: float, row_s: float
+) -> list[Points]:
+    """What is left of each pass of a thread cut downwards, in turns: the angle of the spindle
+    (`turns`) and the way along Z, which undo each other in a perfect thread. Rows are `row_s`
+    apart. A pass is where Z moves with the spindle, without CATCH_UP_S at its begin and its end.
+    """
+    smooth, edge = max(1, round(SMOOTH_S / row_s)), round(CATCH_UP_S / row_s)
+    way = z / pitch
+    speed = (way[smooth:] - way[:-smooth]) / (smooth * row_s)
+    with_it = abs(speed + turns_s) < 0.2 * turns_s
+    edges = numpy.flatnonzero(numpy.diff(numpy.r_[0, with_it, 0]))
+    passes = [(begin + edge, end - edge) for begin, end in zip(edges[::2], edges[1::2])]
+    return [(turns + way)[begin:end] for begin, end in passes if end - begin > edge]
+
+
+def thread_errors(grooves: Sequence[Points]) -> tuple[float, float]:
+    """In turns: the largest range within a pass, and the largest distance of the mean of a pass
+    from that of the first one: all begin at the same angle.
+    """
+    within = max(float(numpy.ptp(groove)) for groove in grooves)
+    starts = numpy.array([groove.mean() for groove in grooves])
+    apart = (starts - starts[0] + 0.5) % 1 - 0.5
+    return within, float(abs(apart).max())
+
+
 def moments(path: Sequence[Sequence[float]], periods_per_mm: float) -> Points:
     """Rows of (time, positions in periods) as points in mm."""
     found: Points = numpy.array(path)[:, 1:] / periods_per_mm
@@ -280,6 +347,11 @@ PROGRAMS = {
     "helix": helix((12, 12), 2, 3, 4, 600),
     "corners": corners((5, 5, 2), 2, 0.05, 900),
     "surface": SURFACE.program([(24, 4), (26, 4), (25, 6)], 3, 120),
+}
+THREAD_MM = 0.5  # pitch
+THREADS = {  # {name: text for a lathe, for the turns of its spindle in a second}
+    "thread": lambda turns_s: threaded((3, 0, 5), 2, THREAD_MM, turns_s).text("XZ"),
+    "passes": lambda turns_s: passes_text((6, 0, 5), 3, THREAD_MM, turns_s, "XZ"),
 }
 # short ones, near the zero
 SHORT_PROGRAMS = {

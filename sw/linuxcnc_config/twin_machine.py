@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Machines as twins in lockstep with LinuxCNC, RTL and firmware: each packet is a servo period of
 the machine's time. MILL is that of constraints/machines/mill_linuxcnc.toml: three steppers, 1 um
-scales, and a touch probe over SURFACE. STAGE is that of S0, both axes in one node: interferometers
-and motors.
+scales, and a touch probe over SURFACE. LATHE has two of its axes, X and Z, and a spindle with an
+encoder. STAGE is that of S0, both axes in one node: interferometers and motors.
 """
 
 import random
@@ -17,13 +17,14 @@ import numpy
 
 from experiments.s2_stage import CLK_HZ, Scale
 from experiments.s2_stage import NODE as STEPPERS
-from linuxcnc_config.generate import SERVO_MS, Configuration, Joint, load
+from linuxcnc_config.generate import SERVO_MS, Configuration, Joint, Spindle, load
 from linuxcnc_config.programs import REST, SURFACE, Points, Surface
 from linuxcnc_config.set_up import set_up
 from moire.analysis.tune import COEFFICIENT, notch
 from moire.bus.link_gateway import LinkGateway
 from moire.client.bus import Bus
 from moire.client.values import FILTER
+from moire.errors import MoireError
 from moire.units import Value
 from twin import Twin, TwinTransport, build
 from twin.nodes.twin import ALL_AXES, NODE, Axis, Node
@@ -34,6 +35,11 @@ SESSION = 0x4D1
 PARTS = 8  # of a period, at whose ends the positions are recorded
 TICK_S = 0.25e-3  # of the servo
 LSB = 1 << 16  # of a position, in a signal period
+READINGS, RESTING_MM = 50, 0.1e-3  # of a table at rest, which may make a step meanwhile
+SPINDLE_LINES, SPINDLE_TURNS_S = 1024, 5.0
+# LinuxCNC follows the spindle by stretches of its largest acceleration, and hunts by about that
+# times the square of its period: 8 um at 500 mm/s2 and 4 ms, 0.5 um at the usual 1 ms
+LATHE_MM_S2 = 60.0
 SCALE = Scale(Fraction(1), 150, Fraction(5, 4), 60)
 START_M = {"travel_start_lowest": 0.5e-3, "travel_start_highest": 1.5e-3}  # a short way to home
 # The friction of the stage disturbs the path where an axis reverses. `moire tune` finds the
@@ -59,16 +65,43 @@ class Plant:
     settings: Mapping[str, Value] = field(default_factory=dict)  # parameters of each axis
     backlash: tuple[Value, Value, Value] | None = None  # as in Axis.set_backlash
     surface: Surface | None = None  # under a touch probe, in mm from where the model has its zeros
+    spindle: Axis | None = None  # the axis after those with a drive
+    spindle_settings: Mapping[str, Value] = field(default_factory=dict)
 
 
+CONFIGURATION = load("mill_linuxcnc")
+SCREW = CONFIGURATION.axes[0]
 MILL = Plant(
-    load("mill_linuxcnc"),
+    CONFIGURATION,
     replace(SCALE.machine(), parameters=SCALE.machine().parameters | START_M),
     "steps_stream",
     {**STEPPERS, "HAS_BACKLASH": ALL_AXES},
     {**SCALE.settings(), "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"},
-    ("5um", "1mm/s", "0.25um"),
+    (f"{SCREW.backlash}um", f"{SCREW.take_up}mm/s", f"{SCREW.hysteresis}um"),
     SURFACE,
+)
+DRIVEN = 0b11  # axes of the lathe
+LATHE = replace(
+    MILL,
+    configuration=replace(
+        MILL.configuration,
+        name="lathe",
+        title="lathe",
+        probe=False,
+        axes=[
+            replace(axis, acceleration=LATHE_MM_S2)
+            for axis in MILL.configuration.axes
+            if axis.name in "XZ"
+        ],
+        spindle=Spindle("S", SPINDLE_LINES),
+    ),
+    parameters={
+        **MILL.parameters,
+        **dict.fromkeys(("HAS_DRIVE", "HAS_STEPPER", "HAS_BACKLASH", "HAS_SET_POINTS"), DRIVEN),
+    },
+    surface=None,
+    spindle=Axis("spindle", {"drive_speed": SPINDLE_TURNS_S, "encoder_lines": SPINDLE_LINES}),
+    spindle_settings={"counts_per_period": 4, "position_source": 1, "deglitch": 0},
 )
 STAGE = Plant(
     Configuration(
@@ -94,13 +127,13 @@ class TwinMachine:
 
     def __init__(self, plant: Plant, seed: int = 1) -> None:
         self.plant, self.axes = plant, len(plant.configuration.axes)
-        parameters = {**plant.parameters, "HAS_SET_POINTS": ALL_AXES, "HAS_LINK": 1}
+        axes = [plant.axis] * self.axes + ([plant.spindle] if plant.spindle else [])
         self.twin = Twin(
-            [Node(1, [plant.axis] * self.axes)],
+            [Node(1, axes)],
             seed=seed,
             clk_hz=CLK_HZ,
-            firmware=build.firmware(plant.image, self.axes),
-            node_parameters=parameters,
+            firmware=build.firmware(plant.image, len(axes)),
+            node_parameters={"HAS_SET_POINTS": ALL_AXES, "HAS_LINK": 1, **plant.parameters},
         )
         if surface := plant.surface:  # Z - slopes * (X, Y) is below its height
             slopes = [-slope for slope in surface.slopes]
@@ -115,10 +148,13 @@ class TwinMachine:
             axis.set_parameter("watchdog_time", 0)  # of the bus, which is silent
             if plant.backlash:
                 axis.set_backlash(*plant.backlash)
+        for name, value in plant.spindle_settings.items():
+            bus.axis(1, self.axes).set_parameter(name, value)
         self.node = bus.node(1)
         self.line = self.twin.link()
-        set_up(self.node, self.axes, SESSION, bit_time=self.line.bit_time, watchdog_s=0)
+        set_up(self.node, len(axes), SESSION, bit_time=self.line.bit_time, watchdog_s=0)
         self.path: list[tuple[float, ...]] = []  # mm of each axis at each part
+        self.turns: list[float] = []  # of the spindle
         self.gateway = LinkGateway(self, PERIOD_S)
         self.thread = threading.Thread(target=self.gateway.serve, daemon=True)
 
@@ -147,6 +183,8 @@ class TwinMachine:
             self.twin.run(seconds / PARTS)
             where = (self.twin.machine(n).state.position_m * 1e3 for n in range(self.axes))
             self.path.append(tuple(where))
+            if self.plant.spindle:
+                self.turns.append(self.twin.truth(self.axes).turns)
         return self.line.take()
 
     @property
@@ -163,24 +201,30 @@ class TwinMachine:
 
     def zero_mm(self, number: int) -> float:
         """The true position of the zero of an axis, which is a whole number of periods away from
-        where the model has a zero.
+        where the model has a zero. It is found while the table rests: reading the count takes time.
+        MoireError if it does not rest.
         """
         period = self.plant.configuration.axes[number].period_um * 1e-3
-        count = self.node.read_named("axis.position", number)["value"]
-        apart = self.twin.machine(number).state.position_m * 1e3 - count / LSB * period
-        apart -= self.model_zero_mm
-        return float(self.model_zero_mm + round(apart / period) * period)
+        for _ in range(READINGS):
+            before = self.twin.machine(number).state.position_m * 1e3
+            count = self.node.read_named("axis.position", number)["value"]
+            after = self.twin.machine(number).state.position_m * 1e3
+            if abs(after - before) < RESTING_MM:
+                apart = after - count / LSB * period - self.model_zero_mm
+                return float(self.model_zero_mm + round(apart / period) * period)
+        raise MoireError(f"axis {number} does not rest")
 
     def true_path(self) -> Points:
-        """Rows of X, Y, Z in mm, true positions of the tables, from the zeros; Z is 0 without an
-        axis. After the end of LinuxCNC, which may have seen the end for some periods only: it rests
-        on without packets.
+        """Rows of X, Y, Z in mm, true positions of the tables, from the zeros; 0 without an axis.
+        After the end of LinuxCNC, which may have seen the end for some periods only: it rests on
+        without packets.
         """
         for _ in range(2 * REST // PARTS):
             self.exchange(b"", PERIOD_S)
         found: Points = numpy.zeros((len(self.path), 3))
-        found[:, : self.axes] = self.path
-        found[:, : self.axes] -= [self.zero_mm(n) for n in range(self.axes)]
+        columns = ["XYZ".index(axis.name) for axis in self.plant.configuration.axes]
+        found[:, columns] = self.path
+        found[:, columns] -= [self.zero_mm(n) for n in range(self.axes)]
         return found
 
     def __enter__(self) -> Self:

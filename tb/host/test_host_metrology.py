@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """moire.analysis.metrology: signals whose density, Allan deviation, harmonics and settling time are
-known, and a test by ISO 230-2 that is computed by hand.
+known, a test by ISO 230-2 that is computed by hand, and circles of a known shape.
 """
 
 import io
@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from moire.analysis import metrology, metrology_pictures
-from moire.analysis.metrology import NotMeasured, Positioning
+from moire.analysis.metrology import Circle, NotMeasured, Positioning
 from tb.bench import seed
 
 RATE_HZ = 4000.0
@@ -133,6 +133,52 @@ def test_a_test_by_iso_230_2_with_too_little_is_refused(up, down):
         Positioning(numpy.arange(len(up)), numpy.array(up), numpy.array(down))
 
 
+# ------------------------------------------------------------------ ISO 230-4
+
+
+def turn(shape, centre=(0.0, 0.0), count=7200):
+    """Points of a path whose radius is a function of its angle."""
+    angle = 2 * math.pi * (numpy.arange(count) + 0.5) / count
+    unit = numpy.stack([numpy.cos(angle), numpy.sin(angle)], axis=-1)
+    return unit * shape(angle)[:, None] + numpy.asarray(centre)
+
+
+def oval(angle):
+    return 5.0 + 0.003 * numpy.cos(2 * angle)
+
+
+def test_an_oval_has_its_range_as_circular_deviation_and_no_hysteresis():
+    test = Circle(5.0, turn(oval), turn(oval))
+    assert test.deviation == pytest.approx(0.006, rel=1e-4)
+    assert test.deviations == pytest.approx((0.006, 0.006), rel=1e-4)
+    assert test.radial_deviation == pytest.approx(0.003, rel=1e-4)
+    assert test.hysteresis == 0 and abs(test.centre).max() < 1e-9
+    assert test.rms == pytest.approx(0.003 / math.sqrt(2), rel=1e-4)
+
+
+def test_a_shifted_circle_is_round_but_deviates_from_the_programmed_one():
+    shifted = turn(lambda angle: numpy.full(len(angle), 5.001), (0.02, -0.01))
+    test = Circle(5.0, shifted, shifted)
+    assert test.centre == pytest.approx([0.02, -0.01], abs=1e-9)
+    assert test.deviation < 1e-9
+    assert test.radial_deviation == pytest.approx(0.001 + math.hypot(0.02, 0.01), rel=1e-3)
+
+
+def test_two_directions_that_differ_have_a_hysteresis():
+    """A backlash of 4 um on X: each direction lies to another side of the centre of both."""
+    one, other = (turn(lambda angle: numpy.full(len(angle), 5.0), (x, 0)) for x in (2e-3, -2e-3))
+    test = Circle(5.0, one, other)
+    assert abs(test.centre).max() < 1e-9
+    assert test.hysteresis == pytest.approx(4e-3, rel=1e-3)
+    assert test.deviation == pytest.approx(4e-3, rel=1e-3)
+
+
+def test_a_circle_with_a_gap_is_refused():
+    whole = turn(oval)
+    with pytest.raises(NotMeasured, match="no point in one of 360 sectors"):
+        Circle(5.0, whole, whole[100:])
+
+
 # ------------------------------------------------------------------ motion and signals
 
 
@@ -177,6 +223,9 @@ def test_what_cannot_be_computed_is_refused():
         lambda: metrology_pictures.standstill(white(2.0, 4096), RATE_HZ),
         lambda: metrology_pictures.allan(white(2.0, 4096), RATE_HZ),
         lambda: metrology_pictures.positioning(by_hand()),
+        lambda: metrology_pictures.circles(
+            {"one": Circle(5.0, turn(oval), turn(oval)), "two": Circle(5.0, turn(oval), turn(oval))}
+        ),
         lambda: metrology_pictures.settling({"X": [0.01, 0.02, 0.02], "Y": []}, 20.0),
         lambda: metrology_pictures.harmonic_bars({"before": [3.0, 1.0], "after": [0.1, 0.2]}),
     ],

@@ -22,13 +22,17 @@ from linuxcnc_config import headless
 from linuxcnc_config.generate import Spindle, load
 from linuxcnc_config.programs import (
     FIRST_LINE,
+    PASSES,
     SURFACE,
     TOUCHED,
     circle,
     corners,
+    grooves_of,
     helix,
     moments,
+    passes_text,
     pocket,
+    thread_errors,
     threaded,
 )
 from linuxcnc_config.set_up import set_up
@@ -50,7 +54,6 @@ TICK_S = TICK / CLK_HZ
 # 1 ms, differs by a quarter of the step, and the cubic by 4/27 of this over 1 ms; four in a row
 MOST_ERROR_MM = 4 * 500 * 1e-6 / 4 * 4 / 27
 PERIODS_PER_TURN, TURNS_S, PITCH_MM = 1024, 20, 0.5
-CATCH_UP = 200  # ticks
 CAPTURES = Captures(PERIOD_CYCLES / CLK_HZ, 0.3e-3)
 LSB_MM = 1 / 65536 / PERIODS_PER_MM
 
@@ -62,14 +65,7 @@ PROGRAMS = {
     "surface": SURFACE.program([(24, 4), (26, 6)], 3, 600),
     "threaded": threaded((3, 3, 5), 2, PITCH_MM, TURNS_S),
 }
-# three passes, in the plane of a lathe
-LATHE = f"""G21 G90 G18 G40 G49 G61
-S{60 * TURNS_S} M3
-G0 X6 Y3 Z5
-G76 P{PITCH_MM} Z3 I-1 J0.2 K0.6 R1 Q0 H0 E0 L0
-M5
-M2
-"""
+LATHE = passes_text((6, 3, 5), 3, PITCH_MM, TURNS_S)
 GANTRY = """
 title = "portal"
 [node]
@@ -265,28 +261,15 @@ def test_the_points_that_g38_touches_are_on_the_surface(day):
     assert math.dist(day.pins(LATCHES), points[-1]) < LSB_MM, "the last touch"
 
 
-def thread_passes(day):
-    """Spindle turns, and Z in turns of the thread, of each pass: where Z moves with the spindle,
-    without the begin, in which it catches up, and the end.
-    """
-    turns = numpy.array(day.node.path)[:, 4] / PERIODS_PER_TURN
-    z = day.path[:, 2] / PITCH_MM
-    with_it = abs(numpy.diff(z) / TICK_S + TURNS_S) < 0.2 * TURNS_S
-    with_it &= abs(day.path[1:, 1] - PROGRAMS["threaded"].start[1]) < MOST_ERROR_MM
-    edges = numpy.flatnonzero(numpy.diff(numpy.r_[0, with_it, 0]))
-    passes = zip(edges[::2] + CATCH_UP, edges[1::2] - CATCH_UP)
-    return [(turns[a:b], z[a:b]) for a, b in passes if b > a]
-
-
 def test_g33_and_each_pass_of_g76_follow_the_spindle_in_the_same_groove(day):
-    passes = thread_passes(day)
-    assert len(passes) == 1 + 3
-    grooves = [turns + z for turns, z in passes]
-    within = max(numpy.ptp(groove) for groove in grooves)
-    starts = numpy.array([groove.mean() for groove in grooves])
-    apart = (starts - starts[0] + 0.5) % 1 - 0.5
-    print(f"a pass follows the spindle within {within:.5f} turns, passes {abs(apart).max():.5f}")
-    assert within < 1e-3 and abs(apart).max() < 1e-3
+    turns = numpy.array(day.node.path)[:, 4] / PERIODS_PER_TURN
+    there = abs(day.path[:, 1] - PROGRAMS["threaded"].start[1]) < MOST_ERROR_MM
+    z = numpy.where(there, day.path[:, 2], numpy.nan)  # of no other program
+    grooves = grooves_of(turns, z, PITCH_MM, TURNS_S, TICK_S)
+    assert len(grooves) == 1 + PASSES
+    within, apart = thread_errors(grooves)
+    print(f"a pass follows the spindle within {within:.5f} turns, passes {apart:.5f}")
+    assert within < 1e-3 and apart < 1e-3
     count, rawcounts = day.pins(COUNTS)
     assert count > 0 and (rawcounts - count) % (4 * PERIODS_PER_TURN) == 0, "0 at an index"
 

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xc4a68325u  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xc9c30ab0u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -787,7 +787,9 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINK_REFUSED_NOW_BUSY_MASK 0x0000ff00u
 #define LINK_REFUSED_NOW_BUSY_SHIFT 8
 #define LINK_REFUSED_NOW_BUSY_WIDTH 8
-// rw: bytes without a stop bit; writing clears the count, which stops at its largest value
+// rw: losses on the carrier: serial, bytes without a stop bit; SPI, transfers that ended within the
+// request or the reply; 0 for UDP, where a damaged datagram counts as a refused packet. Writing
+// clears the count
 #define LINK_FRAMING_ERRORS 0x02cu
 #define LINK_FRAMING_ERRORS_MASK 0x0000ffffu
 #define LINK_FRAMING_ERRORS_SHIFT 0

@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#define MAP_CRC 0xc4a68325u
+#define MAP_CRC 0xc9c30ab0u
 #define NODE_BASE 0x000u
 #define LINK_BASE 0x300u
 #define AXIS_BASE 0x400u

@@ -54,6 +54,7 @@ BENCH_FUNCTIONS: Functions = {
         None,
         [HANDLE, ctypes.c_int64, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32],
     ),
+    "bench_card": (None, [HANDLE, LONG, HANDLE]),
     "bench_frame": (None, [HANDLE, ctypes.c_uint32, WHOLE]),
 }
 
@@ -226,8 +227,30 @@ class MachineHandle:
         return dict(zip(names, values.reshape(-1, len(names)).T.copy()))
 
 
+class StepCard(ctypes.Structure):
+    """The step generator and the counter of a plain card at the pins of a machine, step_card.h."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("accumulator", "emitted", "count", "latched")),
+        *((name, ctypes.c_uint64) for name in ("changed_at", "ready_at", "errors")),
+        ("rate", ctypes.c_int32),
+        *((name, ctypes.c_uint32) for name in ("high", "armed", "enabled")),
+    ]
+    accumulator: int
+    emitted: int
+    count: int
+    latched: int
+    changed_at: int
+    ready_at: int
+    errors: int
+    rate: int
+    high: int
+    armed: int
+    enabled: int
+
+
 class Machine(MachineHandle):
-    """A machine without a node. Time passes in run, watch, bridge, steps and dac."""
+    """A machine without a node. Time passes in run, watch, bridge, steps, with_card and dac."""
 
     PERIOD = 200  # of the PWM in cycles: 20 kHz
 
@@ -290,6 +313,10 @@ class Machine(MachineHandle):
         self.library.bench_steps(
             self.bench, count, self.clk(1 / rate_hz), self.clk(high_s), self.clk(setup_s)
         )
+
+    def with_card(self, seconds: float, card: StepCard) -> None:
+        """Run with a card at the pins of step, direction and enable, and at the encoder."""
+        self.library.bench_card(self.bench, self.clk(seconds), ctypes.addressof(card))
 
     def dac(self, code: int, bits: int = DAC_BITS) -> None:
         """Send one frame to the DAC."""

@@ -5,6 +5,7 @@
 
 #include "machines/rotary_ring.h"
 #include "machines/stage.h"
+#include "machines/step_card.h"
 
 using namespace twin;
 
@@ -23,6 +24,8 @@ class Bench {  // a machine without a node
             machine->clk(now, drive_);
         }
     }
+
+    void run(uint64_t clk, StepCard& card) { run_card(card, *machine, now, clk, drive_); }
 
     std::unique_ptr<Machine> machine;
     double clk_hz;
@@ -100,6 +103,7 @@ void bench_steps(Bench* bench, int64_t count, uint32_t period, uint32_t high, ui
         bench->run(period - high);
     }
 }
+void bench_card(Bench* bench, uint64_t clk, StepCard* card) { bench->run(clk, *card); }
 // One frame to the DAC: `bits` of the word, MSB first, two cycles a bit.
 void bench_frame(Bench* bench, uint32_t word, int bits) {
     bench->pins(0, DAC_CS_N);

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "machines/linear_motor.h"
+#include "machines/spindle.h"
 #include "machines/stage.h"
 #include "machines/stepper_stage.h"
 #include "machines/worm_table.h"
@@ -79,6 +80,7 @@ const Kind KINDS[] = {
     {"stage", sizeof(StageParameters), make<Stage, StageParameters>},
     {"stepper_stage", sizeof(StepperStageParameters), make<StepperStage, StepperStageParameters>},
     {"linear_motor", sizeof(LinearMotorParameters), make<LinearMotor, LinearMotorParameters>},
+    {"spindle", sizeof(SpindleParameters), make<Spindle, SpindleParameters>},
     {"worm_table", sizeof(WormTableParameters), make<WormTable, WormTableParameters>},
     {"loopback_plug", sizeof(LoopbackPlugParameters), make<LoopbackPlug, LoopbackPlugParameters>},
     {"unconnected", sizeof(UnconnectedParameters), make<Unconnected, UnconnectedParameters>},

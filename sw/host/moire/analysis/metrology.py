@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a metrologist asks of a positioning axis: power spectral density, cumulative rms and Allan
-deviation at standstill, accuracy and repeatability by ISO 230-2, settling times, harmonics.
+deviation at standstill, accuracy and repeatability by ISO 230-2, circles by ISO 230-4, settling
+times, harmonics.
 
     still = density(error_nm, rate_hz=4000)
     print(still.amplitude, "nm/sqrt(Hz)", still.cumulative_rms[-1], "nm rms")
     tau_s, deviation_nm = allan_deviation(error_nm, rate_hz=4000)
     test = Positioning(target_nm, up=errors_up_nm, down=errors_down_nm)
     print(test.accuracy, test.repeatability)
+    circle = Circle(radius_mm, counterclockwise=points_mm, clockwise=others_mm)
+    print(circle.deviation, circle.hysteresis)
 
 Values and errors may have any unit of length or angle, and results have the same unit. An error is
 target minus position, as everywhere in this project. `moire.analysis.metrology_pictures` draws the
@@ -185,6 +188,94 @@ class Positioning:
         highest = numpy.max([self.mean_up + 2 * up, self.mean_down + 2 * down])
         lowest = numpy.min([self.mean_up - 2 * up, self.mean_down - 2 * down])
         return float(highest - lowest)
+
+
+# ------------------------------------------------------------------ ISO 230-4
+
+SECTORS = 360  # of a circle, in which paths of both directions are compared
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A test of a circular path by ISO 230-4:2005: points of the path, rows of X and Y from the
+    programmed centre, of a full turn or more in each direction. Raises NotMeasured.
+    """
+
+    radius: float  # programmed
+    counterclockwise: Array
+    clockwise: Array
+
+    def __post_init__(self) -> None:
+        if any(numpy.isnan(self.radial(points)).any() for points in self.paths):
+            raise NotMeasured(f"a path has no point in one of {SECTORS} sectors of the circle")
+
+    @property
+    def paths(self) -> tuple[Array, Array]:
+        return self.counterclockwise, self.clockwise
+
+    @property
+    def centre(self) -> Array:
+        """The centre of the circle that fits both paths best, by least squares."""
+        points = numpy.concatenate(self.paths)
+        found = numpy.zeros(2)
+        for _ in range(5):  # Gauss-Newton: the deviations are small against the radius
+            apart = points - found
+            lengths = numpy.linalg.norm(apart, axis=1)
+            slopes = numpy.column_stack([apart / lengths[:, None], numpy.ones(len(points))])
+            found = found + numpy.linalg.lstsq(slopes, lengths - self.radius, rcond=None)[0][:2]
+        return found
+
+    def radial(self, points: Array, centre: ArrayLike = (0.0, 0.0)) -> Array:
+        """The mean distance from a centre less the programmed radius, in each sector; NaN in one
+        without a point.
+        """
+        apart = points - numpy.asarray(centre)
+        turn = numpy.arctan2(apart[:, 1], apart[:, 0]) / (2 * numpy.pi) % 1
+        sectors = (turn * SECTORS).astype(int) % SECTORS
+        deviations = numpy.linalg.norm(apart, axis=1) - self.radius
+        sums, counts = (
+            numpy.bincount(sectors, weights, SECTORS)
+            for weights in (deviations, numpy.ones(len(points)))
+        )
+        with numpy.errstate(invalid="ignore"):
+            return numpy.asarray(sums / counts)
+
+    def range_of(self, *paths: Array) -> float:
+        """The radial distance of the two circles around the centre that enclose paths."""
+        points = numpy.concatenate(paths) - self.centre
+        return float(numpy.ptp(numpy.linalg.norm(points, axis=1)))
+
+    @property
+    def deviation(self) -> float:
+        """The bidirectional circular deviation G(b)."""
+        return self.range_of(*self.paths)
+
+    @property
+    def deviations(self) -> tuple[float, float]:
+        """The circular deviations G of both directions, each from the centre of both."""
+        return self.range_of(self.counterclockwise), self.range_of(self.clockwise)
+
+    @property
+    def hysteresis(self) -> float:
+        """The circular hysteresis H: the largest distance between the two paths."""
+        one, other = (self.radial(points, self.centre) for points in self.paths)
+        return float(abs(one - other).max())
+
+    @property
+    def rms(self) -> float:
+        """The root mean square of the distances of both paths from the circle that fits best; not
+        in the standard, but no single point decides it.
+        """
+        points = numpy.concatenate(self.paths) - self.centre
+        return float(numpy.std(numpy.linalg.norm(points, axis=1)))
+
+    @property
+    def radial_deviation(self) -> float:
+        """The radial deviation F, the largest one of both paths without its sign: from the
+        programmed circle around its programmed centre.
+        """
+        points = numpy.concatenate(self.paths)
+        return float(abs(numpy.linalg.norm(points, axis=1) - self.radius).max())
 
 
 # ------------------------------------------------------------------ motion and signals

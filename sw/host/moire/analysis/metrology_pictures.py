@@ -7,7 +7,14 @@ import numpy
 from numpy.typing import ArrayLike
 
 from moire.analysis import report
-from moire.analysis.metrology import Array, Positioning, allan_deviation, density
+from moire.analysis.metrology import (
+    SECTORS,
+    Array,
+    Circle,
+    Positioning,
+    allan_deviation,
+    density,
+)
 
 ERROR = "error (target \N{MINUS SIGN} position)"
 
@@ -64,6 +71,35 @@ def positioning(test: Positioning) -> bytes:
     panel.set_xlabel("target / mm")
     panel.set_ylabel(f"{ERROR} / nm")
     report.legend(figure, panel)
+    return report.png(figure)
+
+
+def circles(tests: Mapping[str, Circle], unit: str = "\N{MICRO SIGN}m", factor: float = 1) -> bytes:
+    """Tests of circular paths by ISO 230-4, side by side with one magnification: the radial
+    deviation from the circle that fits both directions best, outside the programmed radius where
+    the path is too wide. `factor` converts the unit of the tests to `unit`.
+    """
+    figure, panels = report.drawing(height=4.0, ncols=len(tests), subplot_kw={"polar": True})
+    angle = numpy.linspace(0, 2 * numpy.pi, SECTORS + 1)
+    most = factor * max(test.deviation for test in tests.values())
+    for panel, (name, test) in zip(panels, tests.items(), strict=True):
+        panel.plot(angle, numpy.zeros(len(angle)), color="#999999", linewidth=0.9)
+        for number, (words, points) in enumerate(
+            zip(("counterclockwise", "clockwise"), test.paths)
+        ):
+            radial = factor * test.radial(points, test.centre)
+            panel.plot(
+                angle + numpy.pi / SECTORS,
+                numpy.append(radial, radial[0]),
+                color=report.colour(number),
+                linewidth=1.2,
+                label=words,
+            )
+        panel.set_ylim(-2 * most, most)
+        panel.tick_params(labelsize=7)
+        panel.set_title(f"{name}\nG(b) = {factor * test.deviation:.3g} {unit}", fontsize=9)
+    figure.supxlabel(f"radial deviation / {unit}", fontsize=9)
+    report.legend(figure, panels[0])
     return report.png(figure)
 
 

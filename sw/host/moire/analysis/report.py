@@ -135,7 +135,7 @@ def drawing(
     for panel in axes:
         panel.grid(True, color="#dddddd", linewidth=0.6)
         panel.set_axisbelow(True)
-        for side in ("top", "right"):
+        for side in {"top", "right"} & set(panel.spines):  # a polar panel has none
             panel.spines[side].set_visible(False)
     return figure, axes
 

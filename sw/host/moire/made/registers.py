@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xC4A68325  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xC9C30AB0  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -914,7 +914,9 @@ FIELDS = (
         "link", "framing_errors", "value",
         0x2C, 0, 16, False, "rw", "",
         Fraction(1, 1),
-        "bytes without a stop bit; writing clears the count, which stops at its largest value",
+        "losses on the carrier: serial, bytes without a stop bit; SPI, transfers that ended "
+        "within the request or the reply; 0 for UDP, where a damaged datagram counts as a "
+        "refused packet. Writing clears the count",
     ),
     Field(
         "link", "pll_period", "value",
