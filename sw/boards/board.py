@@ -30,6 +30,7 @@ ETHERNET = {
     },
 }
 ETHERNET_HZ = 125_000_000  # of its clock
+MOST_DELAY_NS = 3.1  # of a pin of the ECP5
 PULLS = ("up", "down", "none")
 DIRECTIONS = ("both", "in", "out")
 
@@ -68,6 +69,8 @@ class Ethernet:
     """The PHY of a board."""
 
     interface: str
+    tx_delay_ns: float  # by which the FPGA delays the clock to the PHY
+    rx_delay_ns: float  # by which it delays the data from the PHY
     pads: dict[str, Pad]  # by the port of the top
     ports: dict[str, str]  # {pads of the Ethernet core: ports of the top}
 
@@ -164,6 +167,9 @@ def ethernet_of(table: Table) -> Ethernet | None:
     interface = table.take("interface", str)
     if interface not in ETHERNET:
         raise table.misfit(f"interface {interface!r} is none of {', '.join(ETHERNET)}")
+    tx, rx = table.take("tx_delay_ns", float), table.take("rx_delay_ns", float)
+    if not (0 <= tx <= MOST_DELAY_NS and 0 <= rx <= MOST_DELAY_NS):
+        raise table.misfit(f"tx_delay_ns and rx_delay_ns must be 0 to {MOST_DELAY_NS:g}")
     pads: dict[str, Pad] = {}
     ports: dict[str, str] = {}
     for name, (count, direction) in ETHERNET[interface].items():
@@ -179,7 +185,7 @@ def ethernet_of(table: Table) -> Ethernet | None:
         joined = ", ".join(reversed(numbered))
         ports[inside] = f"{{{joined}}}" if count > 1 else joined
     table.close()
-    return Ethernet(interface, pads, ports)
+    return Ethernet(interface, tx, rx, pads, ports)
 
 
 def connector_of(table: Table, name: str, buffer: str) -> dict[str, Pad]:

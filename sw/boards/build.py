@@ -82,8 +82,9 @@ def write(design: Design) -> Path:
     for name, text in files(design).items():
         (folder / name).write_text(text, encoding="utf-8")
     if design.ethernet:
-        board = design.board
-        made = ethernet.core(design.ethernet.interface, board.part.family.name, board.node_hz)
+        board, phy = design.board, design.ethernet
+        delays = phy.tx_delay_ns, phy.rx_delay_ns
+        made = ethernet.core(phy.interface, board.part.family.name, board.node_hz, delays)
         shutil.copyfile(made, folder / made.name)
     return folder
 

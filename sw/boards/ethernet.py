@@ -20,20 +20,22 @@ NAME = "ethernet_core"  # of the module and its file
 MAKER = Path(__file__).with_name("ethernet_core.py")
 
 
-def core(interface: str, family: str, clk_hz: int) -> Path:
+def core(interface: str, family: str, clk_hz: int, delays_ns: tuple[float, float] = (0, 0)) -> Path:
     """The Verilog of the core, made once: an interface of the board, the family of the part (or
-    `simulation`) and the clock of the node. A Misfit says what is missing.
+    `simulation`), the clock of the node, and the delays of the clock to the PHY and of the data
+    from it. A Misfit says what is missing.
     """
     if not has_ethernet():
         raise Misfit("the Ethernet core is made by LiteEth, which is not set up: make litex")
     sources = [MAKER, Path(__file__), ROOT / "sw" / "embed" / "litex.lock"]
     sources.append(Path(link_tables.__file__))
-    name = build.digest(sources, interface, family, clk_hz)
+    words = [interface, family, str(clk_hz), *map(str, delays_ns)]
+    name = build.digest(sources, *words)
 
     def make(folder: Path) -> None:
         file = folder / f"{NAME}.v"
         done = subprocess.run(
-            [sys.executable, "-m", "boards.ethernet_core", interface, family, str(clk_hz), file],
+            [sys.executable, "-m", "boards.ethernet_core", *words, file],
             env={**os.environ, "PYTHONPATH": os.pathsep.join([str(FOLDER), *sys.path])},
             cwd=folder,
             capture_output=True,

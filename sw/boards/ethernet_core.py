@@ -2,15 +2,17 @@
 """Makes the Ethernet core of a board with LiteEth: ARP, ping, and UDP datagrams for the real-time
 link of rtl/node.sv.
 
-    PYTHONPATH=build/litex python -m boards.ethernet_core INTERFACE FAMILY CLK_HZ FILE
+    PYTHONPATH=build/litex python -m boards.ethernet_core INTERFACE FAMILY CLK_HZ TX_NS RX_NS FILE
 
 INTERFACE to the PHY: mii (100 Mbit/s), rgmii (1 Gbit/s), or wide_mii, which is mii with the data
-path of rgmii. FAMILY: ecp5 or simulation. The file is Verilog with one module, `ethernet_core`; its
-port `udp` has the signals of the node's port as seen from the node. `boards.ethernet` runs this;
-`make litex` fetches LiteX and LiteEth.
+path of rgmii. FAMILY: ecp5 or simulation. TX_NS and RX_NS: by how many nanoseconds the FPGA delays
+the clock to the PHY and the data from it, with rgmii. The file is Verilog with one module,
+`ethernet_core`; its port `udp` has the signals of the node's port as seen from the node.
+`boards.ethernet` runs this; `make litex` fetches LiteX and LiteEth.
 """
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,16 +69,19 @@ def pads(interface: str) -> tuple[Any, ...]:
 class EthernetCore(LiteXModule):
     """LiteEth's core, with the datagrams of one UDP port as a stream of bytes."""
 
-    def __init__(self, platform: Any, interface: str, clk_hz: int) -> None:
+    def __init__(self, platform: Any, interface: str, clk_hz: int, delays: Sequence[float]) -> None:
         self.cd_sys = ClockDomain()
         self.comb += [
             self.cd_sys.clk.eq(platform.request("clk")),
             self.cd_sys.rst.eq(platform.request("rst")),
         ]
-        kind = phy.LiteEthECP5PHYRGMII if interface == "rgmii" else phy.LiteEthPHYMII
+        kind, more = phy.LiteEthPHYMII, {}
+        if interface == "rgmii":
+            kind = phy.LiteEthECP5PHYRGMII
+            more = dict(zip(("tx_delay", "rx_delay"), delays, strict=True))
         # the PHY itself is reset by the board; its clock domains are reset with the node
         self.phy = kind(
-            platform.request("clocks"), platform.request("pads"), with_hw_init_reset=False
+            platform.request("clocks"), platform.request("pads"), with_hw_init_reset=False, **more
         )
         self.comb += self.phy.crg._reset.storage.eq(self.cd_sys.rst)
         width = WIDTHS[interface]
@@ -134,25 +139,26 @@ class EthernetCore(LiteXModule):
             self.comb += tx.source.connect(port.sink)
 
 
-def verilog(interface: str, family: str, clk_hz: int) -> str:
-    """The core as Verilog."""
+def verilog(interface: str, family: str, clk_hz: int, delays: Sequence[float]) -> str:
+    """The core as Verilog; the delays are in seconds."""
     io = [*IO, CLOCKS, pads(interface)]
     if family == "ecp5":
         platform: Any = LatticePlatform("LFE5U-25F-6BG381C", io, toolchain="trellis")
     else:
         platform = GenericPlatform("simulation", io)
-    core = EthernetCore(platform, interface, clk_hz)
+    core = EthernetCore(platform, interface, clk_hz, delays)
     core.finalize()
     more = {} if family != "simulation" else {"special_overrides": sim_special_overrides}
     return str(platform.get_verilog(core, name=NAME, **more))
 
 
 def main() -> int:
-    if len(sys.argv) != 5:
+    if len(sys.argv) != 7:
         print(__doc__, file=sys.stderr)
         return 2
-    interface, family, clk_hz, file = sys.argv[1:]
-    Path(file).write_text(verilog(interface, family, int(clk_hz)), encoding="utf-8")
+    interface, family, clk_hz, tx_ns, rx_ns, file = sys.argv[1:]
+    delays = float(tx_ns) * 1e-9, float(rx_ns) * 1e-9
+    Path(file).write_text(verilog(interface, family, int(clk_hz), delays), encoding="utf-8")
     return 0
 
 

@@ -292,8 +292,16 @@ def over_ethernet(folder, address="192.168.1.50", more=""):
     return edited(folder, "constraints/machines/mill.toml", (node, f"{node}\n{table}"))
 
 
-def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(tmp_path):
-    design = fit(board.named("colorlight_i5"), machine.load(over_ethernet(tmp_path)))
+@pytest.mark.parametrize(
+    "name, balls",
+    [
+        ("colorlight_i5", {"rx_clk": "H2", "tx_ctl": "K1", "tx_data_3": "J3"}),
+        ("colorlight_i9", {"rx_clk": "H2", "tx_ctl": "K1", "tx_data_3": "J3"}),
+        ("colorlight_5a_75b_v8_0", {"rx_clk": "J1", "tx_ctl": "L2", "tx_data_3": "R1"}),
+    ],
+)
+def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(name, balls, tmp_path):
+    design = fit(board.named(name), machine.load(over_ethernet(tmp_path)))
     assert (design.parameters["HAS_LINK"], design.parameters["LINK_CARRIER"]) == (1, 1)
     made = generate.files(design)
     assert f".mac_address(48'd{0x024D_C0A8_0132})," in made["top.sv"]
@@ -308,10 +316,18 @@ def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(tmp_path):
         'IOBUF PORT "eth_tx_clk" PULLMODE=NONE IO_TYPE=LVCMOS33 DRIVE=8 SLEWRATE=FAST;'
         in (made["pins.lpf"])
     )
-    for port, ball in (("eth_rx_clk", "H2"), ("eth_tx_ctl", "K1"), ("eth_tx_data_3", "J3")):
-        assert f'LOCATE COMP "{port}" SITE "{ball}";' in made["pins.lpf"]
-    plain = generate.files(fit(board.named("colorlight_i5"), machine.named("mill")))
+    for port, ball in balls.items():
+        assert f'LOCATE COMP "eth_{port}" SITE "{ball}";' in made["pins.lpf"]
+    plain = generate.files(fit(board.named(name), machine.named("mill")))
     assert "eth_" not in plain["pins.lpf"] and "ethernet_core" not in plain["top.sv"]
+
+
+def test_the_delays_of_the_phy_are_in_the_range_of_the_part(tmp_path):
+    path = edited(
+        tmp_path, "constraints/colorlight_i5/board.toml", ("rx_delay_ns = 2.0", "rx_delay_ns = 4")
+    )
+    found = refusal(lambda: board.load(path))
+    assert found == f"{path}: [ethernet] tx_delay_ns and rx_delay_ns must be 0 to 3.1"
 
 
 @pytest.mark.parametrize(

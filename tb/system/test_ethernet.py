@@ -5,6 +5,7 @@ MII pins. Without LiteX (`make litex`) the tests are skipped.
 
 import logging
 import random
+import re
 from importlib.util import find_spec
 
 import pytest
@@ -199,6 +200,14 @@ def test_a_host_that_does_not_answer_arp_stops_the_link_only_for_a_while(node):
     host.ask(host.datagram(link.request(0, [3, 0])))
     assert link.reply(host.link(link.request(0, [4, 0])))
     assert node.read_named("axis.output_limit") == {"value": 4}
+
+
+@needs_litex
+def test_the_pins_of_rgmii_are_delayed_in_steps_of_25_ps():
+    """The clock to the PHY, five levels to it, and five levels from it."""
+    text = ethernet.core("rgmii", "ecp5", 50_000_000, (0.5, 2)).read_text()
+    delays = re.findall(r"DEL_VALUE \(\d+'d(\d+)\)", text)
+    assert sorted(map(int, delays)) == [0] * 5 + [20] + [80] * 5
 
 
 @needs_litex
