@@ -34,9 +34,11 @@ module datagram_bench (
     output logic        select
 );
     wire valid, ends, broken, foreign, accepted, rx_ready, expired, request, write;
+    wire pll_locked, capturing;
     wire [ 7:0] tx_data;
     wire [15:0] address;
-    wire [31:0] wdata;
+    wire [20:0] phase_error;
+    wire [31:0] wdata, read_at;
 
     link_datagram u_datagram (
         .clk,
@@ -66,18 +68,24 @@ module datagram_bench (
         .writes,
         .reads,
         .time_window,
-        .watchdog_ms(16'd0),
+        .watchdog_ms (16'd0),
+        .pll_period  (20'd0),
+        .capture_lead(19'd0),
         .list_put,
         .list_at,
         .list_entry,
         .busy,
         .refused,
         .expired,
-        .rx_valid   (valid),
+        .locked      (pll_locked),
+        .phase_error,
+        .capturing,
+        .read_at,
+        .rx_valid    (valid),
         .rx_data,
-        .rx_ends    (ends),
-        .rx_broken  (broken),
-        .rx_foreign (foreign),
+        .rx_ends     (ends),
+        .rx_broken   (broken),
+        .rx_foreign  (foreign),
         .accepted,
         .tx_valid,
         .tx_data,
@@ -89,10 +97,13 @@ module datagram_bench (
         .write,
         .address,
         .wdata,
-        .rdata      (32'd0)
+        .rdata       (32'd0)
     );
 
-    wire unused = &{1'b0, rx_ready, expired, request, write, tx_data, address, wdata};
+    wire unused = &{
+        1'b0, rx_ready, expired, request, write, tx_data, address, wdata,
+        pll_locked, phase_error, capturing, read_at
+    };
 endmodule
 
 `default_nettype wire
