@@ -8,10 +8,8 @@ runs a command in this namespace, whose interface has the address 192.168.1.1. I
 (`make litex`), and root. The node is slower than a board: an answer takes some milliseconds.
 """
 
-import fcntl
 import os
 import select
-import struct
 import subprocess
 import sys
 import threading
@@ -20,10 +18,10 @@ from types import TracebackType
 from typing import Self
 
 from figures.ethernet import EthernetNode
+from twin.devices.tap import open_tap
 
 DEVICE = "moire0"
 NETWORK = "192.168.1.1/24"  # address of the host
-TUNSETIFF, TAP, WITHOUT_HEADER = 0x400454CA, 0x0002, 0x1000  # of linux/if_tun.h
 LONGEST = 2048  # bytes of a frame, rounded up
 CYCLES = 200  # of the PHY in one step
 POLL_S = 0.001  # how long an idle node waits for a frame
@@ -36,9 +34,7 @@ class NodeBehindTap:
 
     def __init__(self, node: EthernetNode) -> None:
         self.node, self.stopped = node, threading.Event()
-        self.frames = os.open("/dev/net/tun", os.O_RDWR)
-        request = struct.pack("16sH", DEVICE.encode(), TAP | WITHOUT_HEADER)
-        fcntl.ioctl(self.frames, TUNSETIFF, request)
+        self.frames = open_tap(DEVICE)
         for words in (("address", "add", NETWORK), ("link", "set", "up")):
             subprocess.run(["ip", *words, "dev", DEVICE], check=True)
         self.thread = threading.Thread(target=self.serve)

@@ -25,7 +25,16 @@ from linuxcnc_config.programs import (
     Program,
 )
 from linuxcnc_config.threads import cut
-from linuxcnc_config.twin_machine import MILL, PERIOD_S, SESSION, STAGE, Plant, TwinMachine
+from linuxcnc_config.twin_machine import (
+    MILL,
+    PERIOD_S,
+    SESSION,
+    SETTLED_MM,
+    STAGE,
+    Plant,
+    TwinMachine,
+    running,
+)
 from moire.bus.cobs import sealed
 from moire.errors import MoireError
 from moire.units import Value
@@ -39,8 +48,6 @@ HOMINGS, LOST = 10**4, 0.01
 BELOW_M = {"travel_start_lowest": -1.5e-3, "travel_start_highest": -0.5e-3}  # the index
 UPWARD: Mapping[str, Value] = {"home_method": 34, "home_distance": "2mm"}
 TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
-PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
-STILL_MM = 0.003  # a stepper that settles on its scale of 1 um
 TOUCH_MM = 0.002  # of a touched point from the surface
 PITCH_MM = 0.003  # error of a pitch, and of a pass from the groove of the first one
 BLEND_MM = {"corners": 0.05}  # tolerance of its G64
@@ -59,15 +66,12 @@ def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]
     """
     if reason := missing():
         raise Absent(reason)
-    steps: list[list[str | float]] = [["patience", PATIENCE_S], ["on"], ["home"]]
-    for name in names:
-        steps += [["start", f"{name}.ngc"], ["finish"]]
     plant, programs = MACHINES[machine]
     letters = "".join(axis.name for axis in plant.configuration.axes)
     texts = {f"{name}.ngc": programs[name].text(letters) for name in names}
     found: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder, TwinMachine(plant, seed) as served:
-        ran = run(served.configuration(), Path(folder), steps, texts)
+        ran = run(served.configuration(), Path(folder), running(names), texts)
         path = served.true_path()
         if (touched := Path(folder) / TOUCHED).exists():
             heights = served.above_mm(numpy.loadtxt(touched, ndmin=2)[:, :3])
@@ -77,7 +81,7 @@ def errors_mm(machine: str, names: Sequence[str], seed: int) -> dict[str, float]
         raise MoireError(f"LinuxCNC did not run: {ran.printed[-500:]}")
     ended = [row["done"] for row in ran.report if row["step"] == ["finish"]]
     for name in [name for name, done in zip(names, ended) if done]:
-        distances, path = programs[name].errors(path, STILL_MM)
+        distances, path = programs[name].errors(path, SETTLED_MM)
         found[name] = float(distances.max())
         console.print(f"{name}: largest distance from the path {1000 * found[name]:.3f} um")
     return found

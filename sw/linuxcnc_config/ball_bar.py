@@ -21,19 +21,17 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from linuxcnc_config.headless import Run, missing, run
+from linuxcnc_config.headless import missing, run
 from linuxcnc_config.hostmot2 import Gains, Hostmot2Machine
 from linuxcnc_config.programs import Points, Program, both_ways, turns_of
-from linuxcnc_config.twin_machine import MILL, Plant, TwinMachine
+from linuxcnc_config.twin_machine import MILL, SETTLED_MM, Plant, TwinMachine, running
 from moire.analysis.metrology import Circle
 from moire.analysis.metrology_pictures import circles
 from moire.errors import MoireError
 
 CENTRE, RADIUS_MM, HEIGHT_MM, FEED = (15.0, 10.0), 5.0, 1.0, 600.0  # mm/min
 SHORT_CENTRE, SHORT_MM = (1.5, 1.5), 1.0
-STILL_MM = 0.003  # a stepper that settles on its scale of 1 um
-PATIENCE_S = 1500.0
-NAME = "circle.ngc"
+NAME = "circle"
 # Found by --tune, from Pgain = 20 / s and FF1 = 1: at 90 / s the table swings on the screw, and at
 # 120 / s the motor loses steps. Any Igain lets the path wind up in the backlash.
 GAINS = Gains(p=70, i=0, ff1=1, ff2=0.0007)
@@ -48,41 +46,33 @@ NODE, UNCOMPENSATED, PID = "node", "node, backlash not compensated", "LinuxCNC's
 UNCOMPENSATED_MILL = replace(MILL, backlash=None)
 
 
-def ran_well(ran: Run) -> None:
-    """MoireError if LinuxCNC did not come to the end."""
-    if not ran.done:
-        raise MoireError(f"LinuxCNC did not run: {ran.printed[-500:]} {ran.report[-1:]}")
-
-
-def by_node(plant: Plant, texts: Mapping[str, str], seed: int) -> Points:
+def by_node(plant: Plant, text: str, seed: int) -> Points:
     """The true path of a node's machine, in mm."""
     with tempfile.TemporaryDirectory() as folder, TwinMachine(plant, seed) as served:
-        ran_well(run(served.configuration(), Path(folder), steps(), texts))
+        run(served.configuration(), Path(folder), running([NAME]), {f"{NAME}.ngc": text}).finished()
         return served.true_path()
 
 
-def by_pid(gains: Gains, texts: Mapping[str, str], seed: int) -> Points:
+def by_pid(gains: Gains, text: str, seed: int) -> Points:
     """The true path of the same machine at a card, in mm."""
     with tempfile.TemporaryDirectory() as folder, Hostmot2Machine(MILL, gains, seed) as served:
-        within = served.cable.within
-        ran_well(run(served.configuration(), Path(folder), steps(), texts, served.hal(), within))
+        how = served.hal(), served.cable.within
+        run(
+            served.configuration(), Path(folder), running([NAME]), {f"{NAME}.ngc": text}, *how
+        ).finished()
         return served.true_path()
 
 
-def steps() -> list[list[str | float]]:
-    return [["patience", PATIENCE_S], ["on"], ["home"], ["start", NAME], ["finish"]]
-
-
-VARIANTS: Mapping[str, Callable[[Mapping[str, str], int], Points]] = {
-    NODE: lambda texts, seed: by_node(MILL, texts, seed),
-    UNCOMPENSATED: lambda texts, seed: by_node(UNCOMPENSATED_MILL, texts, seed),
-    PID: lambda texts, seed: by_pid(GAINS, texts, seed),
+VARIANTS: Mapping[str, Callable[[str, int], Points]] = {
+    NODE: lambda text, seed: by_node(MILL, text, seed),
+    UNCOMPENSATED: lambda text, seed: by_node(UNCOMPENSATED_MILL, text, seed),
+    PID: lambda text, seed: by_pid(GAINS, text, seed),
 }
 
 
 def judged(path: Points, program: Program, centre: tuple[float, float], radius: float) -> Circle:
     """The circle in a path."""
-    part, _ = program.followed(path, STILL_MM)
+    part, _ = program.followed(path, SETTLED_MM)
     return Circle(radius, *turns_of(part, centre))
 
 
@@ -93,7 +83,7 @@ def circle(variant: str, seed: int = 1, short: bool = False) -> Circle:
         raise MoireError(reason)
     centre, radius = (SHORT_CENTRE, SHORT_MM) if short else (CENTRE, RADIUS_MM)
     program = both_ways(centre, radius, HEIGHT_MM, FEED)
-    return judged(VARIANTS[variant]({NAME: program.text()}, seed), program, centre, radius)
+    return judged(VARIANTS[variant](program.text(), seed), program, centre, radius)
 
 
 def results(found: Circle) -> dict[str, float]:
@@ -134,7 +124,7 @@ def tune(seed: int = 1) -> None:
         ]
     for gains in neighbours:
         try:
-            path = by_pid(gains, {NAME: program.text()}, seed)
+            path = by_pid(gains, program.text(), seed)
             print(line_of(str(gains), judged(path, program, CENTRE, RADIUS_MM)), flush=True)
         except MoireError as error:
             print(f"{gains}: {error}", flush=True)

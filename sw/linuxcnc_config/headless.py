@@ -18,6 +18,7 @@ from typing import Any
 
 from boards.toml_file import ROOT
 from linuxcnc_config.generate import Configuration, write
+from moire.errors import MoireError
 
 SOURCES = ROOT / "sw" / "linuxcnc"
 BUILD = ROOT / "build" / "linuxcnc"
@@ -78,6 +79,11 @@ class Run:
     def done(self) -> bool:
         """Whether all steps were done."""
         return bool(self.report) and all(row["done"] for row in self.report)
+
+    def finished(self) -> None:
+        """MoireError if it did not come to the end."""
+        if not self.done:
+            raise MoireError(f"LinuxCNC did not run: {self.printed[-500:]} {self.report[-1:]}")
 
 
 def with_own_port(ini: Path) -> None:

@@ -10,7 +10,6 @@ jitter.
 """
 
 import ctypes
-import fcntl
 import os
 import select
 import struct
@@ -28,6 +27,7 @@ from linuxcnc_config.programs import REST, Points
 from linuxcnc_config.twin_machine import PARTS, Plant
 from moire.errors import MoireError
 from twin import Machine
+from twin.devices.tap import open_tap
 from twin.machines.machine import StepCard
 
 CLOCK_HZ = 100_000_000  # of step generators and counters
@@ -57,7 +57,6 @@ RECEIVED = 0x0A  # count of packets in SPACE_STATUS
 # the cable: a TAP device in a network namespace of its own
 DEVICE, HOST, CARD = "mesa0", "192.168.1.1", "192.168.1.121"
 CARD_MAC = bytes.fromhex("020000000121")
-TUNSETIFF, TAP, WITHOUT_HEADER = 0x400454CA, 0x0002, 0x1000  # of linux/if_tun.h
 CLONE_NEWNET = 0x40000000
 ETHERNET, IP, UDP = struct.Struct("!6s6sH"), struct.Struct("!BBHHHBBH4s4s"), struct.Struct("!HHHH")
 TYPE_IP, PROTOCOL_UDP, LONGEST = 0x0800, 17, 2048
@@ -251,8 +250,7 @@ class Cable:
         """The TAP device, in a namespace of this thread."""
         if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET):
             raise OSError(ctypes.get_errno(), "no network namespace")
-        frames = os.open("/dev/net/tun", os.O_RDWR)
-        fcntl.ioctl(frames, TUNSETIFF, struct.pack("16sH", DEVICE.encode(), TAP | WITHOUT_HEADER))
+        frames = open_tap(DEVICE)
         for words in (
             ("address", "add", f"{HOST}/24", "dev", DEVICE),
             ("link", "set", DEVICE, "up"),

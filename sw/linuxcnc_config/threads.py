@@ -11,11 +11,17 @@ import numpy
 
 from linuxcnc_config.headless import run
 from linuxcnc_config.programs import PASSES, THREAD_MM, THREADS, grooves_of, thread_errors
-from linuxcnc_config.twin_machine import LATHE, PARTS, PERIOD_S, SPINDLE_TURNS_S, TwinMachine
+from linuxcnc_config.twin_machine import (
+    LATHE,
+    PARTS,
+    PERIOD_S,
+    SPINDLE_TURNS_S,
+    TwinMachine,
+    running,
+)
 from moire.errors import MoireError
 
 CUTS = {"thread": 1, "passes": PASSES}  # of each of THREADS
-PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
 
 
 def cut(names: Sequence[str] = tuple(THREADS), seed: int = 1) -> tuple[float, float]:
@@ -23,15 +29,11 @@ def cut(names: Sequence[str] = tuple(THREADS), seed: int = 1) -> tuple[float, fl
     that of the spindle, and the largest distance of a pass from the groove of the first one.
     MoireError if LinuxCNC does not come to the end or a pass is missing.
     """
-    steps: list[list[str | float]] = [["patience", PATIENCE_S], ["on"], ["home"]]
-    for name in names:
-        steps += [["start", f"{name}.ngc"], ["finish"]]
     texts = {f"{name}.ngc": THREADS[name](SPINDLE_TURNS_S) for name in names}
     with tempfile.TemporaryDirectory() as folder, TwinMachine(LATHE, seed) as served:
-        ran = run(served.configuration(), Path(folder), steps, texts)
+        ran = run(served.configuration(), Path(folder), running(names), texts)
         z, turns = served.true_path()[:, 2], numpy.array(served.turns)
-    if not ran.done:
-        raise MoireError(f"LinuxCNC did not run: {ran.printed[-500:]} {ran.report[-1:]}")
+    ran.finished()
     grooves = grooves_of(turns, z, THREAD_MM, SPINDLE_TURNS_S, PERIOD_S / PARTS)
     if len(grooves) != sum(CUTS[name] for name in names):
         raise MoireError(f"{len(grooves)} passes of {', '.join(names)}")

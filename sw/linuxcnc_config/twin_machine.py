@@ -7,7 +7,7 @@ encoder. STAGE is that of S0, both axes in one node: interferometers and motors.
 
 import random
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from types import TracebackType
@@ -35,6 +35,8 @@ SESSION = 0x4D1
 PARTS = 8  # of a period, at whose ends the positions are recorded
 TICK_S = 0.25e-3  # of the servo
 LSB = 1 << 16  # of a position, in a signal period
+SETTLED_MM = 0.003  # of a stepper that settles on its scale of 1 um
+PATIENCE_S = 1500.0  # with a step of the operator: the twin is slower than real time
 READINGS, RESTING_MM = 50, 0.1e-3  # of a table at rest, which may make a step meanwhile
 SPINDLE_LINES, SPINDLE_TURNS_S = 1024, 5.0
 # LinuxCNC follows the spindle by stretches of its largest acceleration, and hunts by about that
@@ -120,6 +122,14 @@ STAGE = Plant(
     {**NODE, "FILTERS": 2},
     STAGE_SERVO,
 )
+
+
+def running(names: Iterable[str]) -> list[list[str | float]]:
+    """The steps of an operator who homes the machine and runs these programs, `name.ngc`."""
+    steps: list[list[str | float]] = [["patience", PATIENCE_S], ["on"], ["home"]]
+    for name in names:
+        steps += [["start", f"{name}.ngc"], ["finish"]]
+    return steps
 
 
 class TwinMachine:

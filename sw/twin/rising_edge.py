@@ -479,6 +479,11 @@ class Edges:
         yield "return;"
         yield "}"
 
+    def chosen(self, number: int, may_rest: str) -> Iterator[str]:
+        """Statements that evaluate an edge, and observe it only where more may rest."""
+        yield from (f"if (!({may_rest})) {{", f"if (edge_{number}(vlSelfRef, rest)) return;")
+        yield from ("} else {", *self.observed(number), "}")
+
 
 def function(design: Design) -> str:
     """The C++ of `rising_edge`, which evaluates a design whose inputs are set and whose reset is
@@ -519,20 +524,10 @@ def function(design: Design) -> str:
             lines += [
                 f"const bool stays = rest.last_{line} == vlSelfRef.{line};",
                 f"rest.last_{line} = vlSelfRef.{line};",
-                "if (!stays) {",
-                f"if (edge_{number}(vlSelfRef, rest)) return;",
-                "} else {",
-                *edges.observed(number),
-                "}",
+                *edges.chosen(number, "stays"),
             ]
         elif number == 1:
-            lines += [
-                f"if (!({waits})) {{",
-                "if (edge_1(vlSelfRef, rest)) return;",
-                "} else {",
-                *edges.observed(number),
-                "}",
-            ]
+            lines += edges.chosen(number, waits)
         else:
             lines += edges.observed(number)
         lines.append("}")

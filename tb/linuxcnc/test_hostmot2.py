@@ -169,7 +169,7 @@ def test_linuxcnc_runs_a_circle_with_its_own_drivers(needs_linuxcnc):
 def test_gains_that_do_not_fit_the_machine_are_reported(needs_linuxcnc):
     program = ball_bar.both_ways(ball_bar.SHORT_CENTRE, ball_bar.SHORT_MM, 1.0, ball_bar.FEED)
     with pytest.raises(MoireError, match="lost counts or steps|did not run"):
-        ball_bar.by_pid(replace(GAINS, p=400), {ball_bar.NAME: program.text()}, 1)
+        ball_bar.by_pid(replace(GAINS, p=400), program.text(), 1)
 
 
 def test_the_hal_file_has_a_pid_for_each_axis():
