@@ -133,6 +133,9 @@ flash: $(SETUP)   ## the same into the flash of the board
 board: $(SETUP)   ## the bitstream and the wiring page of a machine on a board: BOARD=x MACHINE=y; docs/boards.md
 	@$(PYTHON) -m boards.build --board '$(BOARD)' --machine '$(MACHINE)' $(if $(SEED),--seed $(SEED))
 
+boards: $(SETUP)  ## all machines on all boards placed with 3 seeds into docs/placements.toml, for hours; K=names, SEEDS=n, MINUTES=n; docs/boards.md
+	@$(PYTHON) -m boards.placements $K --jobs $(JOBS) $(if $(SEEDS),--seeds $(SEEDS)) $(if $(MINUTES),--minutes $(MINUTES))
+
 docs: $(DOCS)     ## the pages and the reference of the host package as a site in build/docs/site, every link checked
 	@$(PYTHON) -m tools.docs_site
 
@@ -215,4 +218,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board load flash docs litex mutators sigrok gowin loader linuxcnc chromium page ngspice spice clean
+.PHONY: help demo test check proofs lint types promises format prove tables fresh firmware figure quick figures soak coverage board boards load flash docs litex mutators sigrok gowin loader linuxcnc chromium page ngspice spice clean

@@ -5,17 +5,24 @@ import os
 import sys
 from pathlib import Path
 
-from boards import board, machine
+from boards import board, machine, placements
 from boards.board import Board
 from boards.build import fitting
 from boards.fit import Design
 from boards.machine import Axis, Machine
+from boards.placements import Build
 from tables import made_files
 from tables.made_files import ROOT
 
 PAGE = ROOT / "docs" / "boards.md"
 BEGIN = "<!-- Made by tables/boards.py from constraints/: do not edit. -->\n"
 END = "<!-- End of the made tables. -->\n"
+
+
+PLACED = (
+    "What was placed so far, by `make boards` ([placements](#placements)); the hash is that of the "
+    "placement with the first seed:"
+)
 
 
 def table(head: str, rows: list[list[str]]) -> list[str]:
@@ -79,10 +86,32 @@ def design_row(one: Design) -> list[str]:
     ]
 
 
+def placed_row(one: Design, known: Build) -> list[str]:
+    """What the record says of a build."""
+    placed = [known.seeds[seed] for seed in sorted(known.seeds)]
+    mhz = [each.mhz for each in placed if not each.failed]
+    failed = [str(seed) for seed, each in known.seeds.items() if each.failed]
+    if not placed:
+        worst = "no open tool places it" if known.netlist else "not placed yet"
+    else:
+        worst = f"failed with seed {', '.join(failed)}" if failed else f"{min(mhz):.1f}"
+    return [
+        f"`{one.machine.name}` on `{one.board.name}`",
+        known.used,
+        f"{one.board.node_hz / 1e6:g}",
+        str(len(placed)),
+        worst,
+        f"{max(mhz):.1f}" if mhz else "",
+        f"`{placed[0].placement}`" if placed and placed[0].placement else "",
+        max(each.date for each in placed).isoformat() if placed else "",
+    ]
+
+
 def make() -> dict[Path, str]:
     boards = [board.named(name) for name in board.names()]
     machines = [machine.named(name) for name in machine.names()]
     designs, refused = fitting()
+    known = placements.read()
     lines = [
         *table(
             "board, what it is, part, clock of the node, pins, levels, bus",
@@ -98,6 +127,12 @@ def make() -> dict[Path, str]:
         ),
         *(["", "Wired, but too large:", ""] * bool(refused)),
         *(f"- {why}" for why in refused),
+        "",
+        PLACED,
+        *table(
+            "build, takes of its part, clock in MHz, seeds, worst MHz, best MHz, hash, date",
+            [placed_row(one, known.get(one.name, Build())) for one in designs],
+        ),
         "",
     ]
     return {PAGE: made_files.filled(PAGE, BEGIN, END, lines)}

@@ -206,6 +206,7 @@ def used(design: Design, utilization: Mapping[str, Any]) -> str:
     words = [
         f"{utilization[cell]['used']} of {utilization[cell]['available']} {name}"
         for name, cell in placer(design).used.items()
+        if cell in utilization
     ]
     return ", ".join(words)
 
@@ -242,8 +243,10 @@ def told(design: Design) -> str:
         for line in lock.read_text().splitlines()
         if "nextpnr" in line or "apycula" in line.lower()
     ]
-    options = [*chip(design), *pinned(design, OUT), design.board.node_hz]
-    return repr((versions, options, files(design)[design.board.part.family.constraints]))
+    family = design.board.part.family
+    options = [*chip(design), *pinned(design, OUT)] if family.placer else []
+    constraints = files(design)[family.constraints]
+    return repr((versions, [*options, design.board.node_hz], constraints))
 
 
 def netlist_state(design: Design, netlist: Path) -> str:

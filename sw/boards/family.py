@@ -129,7 +129,10 @@ FAMILIES = {
                 ["yowasp-ecppack", "--compress"],
                 "--lpf",
                 "--textcfg",
-                {"LUT": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAM": "DP16KD"},
+                {
+                    **{"LUT": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF"},
+                    **{"block RAM": "DP16KD", "multipliers": "MULT18X18D"},
+                },
                 block_ram.ECP5,
             ),
         ),
@@ -146,7 +149,10 @@ FAMILIES = {
                 ["yowasp-icepack"],
                 "--pcf",
                 "--asc",
-                {"logic cells": "ICESTORM_LC", "block RAM": "ICESTORM_RAM"},
+                {
+                    **{"logic cells": "ICESTORM_LC", "block RAM": "ICESTORM_RAM"},
+                    "multipliers": "ICESTORM_DSP",
+                },
             ),
         ),
         Family(

@@ -3,22 +3,18 @@
 builds it, and how much of two small parts the mill takes.
 """
 
-import json
 from collections.abc import Callable
-from functools import cache, partial
-from pathlib import Path
 
 from boards import board as boards
-from boards import build
+from boards import build, placements
 from boards import machine as machines
 from boards.fit import Design, fit
 from boards.generate import files
 from boards.toml_file import Misfit
 from figures.common import Figure, Quick, console, seeds
-from figures.synthesis import PLACEMENTS, NotEndedError, SynthesisError
+from figures.synthesis import PLACEMENTS, SynthesisError
 
 SMALL = ("counter_box", "relay")  # machines on an iCEBreaker
-RESULTS = build.OUT / "results"  # of placements that are done
 
 
 def generated(design: Design, _seed: int) -> str:
@@ -28,70 +24,20 @@ def generated(design: Design, _seed: int) -> str:
     return f"{missing[0]} is missing" if missing else ""
 
 
-def netlist_state(design: Design, synthesise: Callable[[], Path]) -> str:
-    """What nextpnr sees of a design; it is synthesised only if its sources have changed."""
-    file = RESULTS / f"{design.name}-{build.state(design)[:16]}.netlist"
-    if not file.is_file():
-        RESULTS.mkdir(parents=True, exist_ok=True)
-        file.write_text(build.netlist_state(design, synthesise()))
-    return file.read_text()
-
-
-def once(design: Design, seed: int, state: str, measure: Callable[[], float]) -> float:
-    """What is measured of a design with a seed, or what it was before if nothing has changed that
-    nextpnr sees; so the hours of the figure may be divided into sittings. A tool that failed is a
-    result, too, but one that did not end in time is none.
-    """
-    file = RESULTS / f"{design.name}-seed{seed}-{state[:16]}.json"
-    if not file.is_file():
-        found: dict[str, float | str] = {}
-        try:
-            found["mhz"] = measure()
-        except NotEndedError:
-            raise
-        except SynthesisError as why:
-            found["why"] = str(why)
-        file.write_text(json.dumps(found))
-    known = json.loads(file.read_text())
-    if "why" in known:
-        raise SynthesisError(known["why"])
-    return float(known["mhz"])
-
-
-def clocks(design: Design, seed: int) -> list[float]:
-    """MHz at each of the seeds, with a bitstream made of each placement; empty for a part that no
-    open tool places, of which only the netlist is made.
-    """
-    build.check_tools(design)
-
-    @cache
-    def netlist() -> tuple[Path, Path]:
-        folder = build.write(design)
-        build.make_firmware(design, folder)
-        return folder, build.synthesise(design, folder)
-
-    def placed(one: int) -> float:
-        folder, made = netlist()
-        mhz = build.place(design, folder, made, one)[0]
-        build.pack(design, folder)
-        return mhz
-
-    if design.board.part.family.placer is None:
-        netlist()
-        return []
-    state = netlist_state(design, lambda: netlist()[1])
-    tries = [once(design, one, state, partial(placed, one)) for one in seeds(seed, PLACEMENTS)]
-    console.print(f"{design.name}: {', '.join(f'{mhz:.1f}' for mhz in tries)} MHz")
-    return tries
+def told(design: Design, seed: int) -> placements.Build:
+    """What the record says of a design after the placement of the seeds that it lacks."""
+    say: placements.Say = lambda text: console.print(text, markup=False, highlight=False)
+    known = placements.measured(design, seeds(seed, PLACEMENTS), say)
+    tries = [known.seeds[one] for one in seeds(seed, PLACEMENTS) if one in known.seeds]
+    if tries:
+        words = ", ".join(one.failed or f"{one.mhz:.1f} MHz ({one.date})" for one in tries)
+        say(f"{design.name}: {words}")
+    return known
 
 
 def built(design: Design, seed: int) -> str:
-    """Why a design has no bitstream or misses its clock at one of the seeds; empty if it is good. A
-    part that no open tool places has a netlist.
-    """
-    needed = design.board.node_hz / 1e6
-    reached = min(clocks(design, seed), default=needed)
-    return f"{reached:.1f} MHz, {needed:g} are needed" if reached < needed else ""
+    """Why a design has no bitstream or misses its clock at a seed; empty if it is good."""
+    return placements.too_slow(design, told(design, seed), seeds(seed, PLACEMENTS))
 
 
 def board_small_mhz(places: bool = True, seed: int = 1) -> float:
@@ -99,7 +45,8 @@ def board_small_mhz(places: bool = True, seed: int = 1) -> float:
     designs = [fit(boards.named("icebreaker"), machines.named(name)) for name in SMALL]
     if not places:
         return min(design.board.node_hz / 1e6 for design in designs if not generated(design, seed))
-    return min(mhz for design in designs for mhz in clocks(design, seed))
+    wanted = seeds(seed, PLACEMENTS)
+    return min(placements.worst_mhz(told(design, seed), wanted) for design in designs)
 
 
 def boards_failed(places: bool = True, seed: int = 1) -> float:
@@ -173,7 +120,8 @@ FIGURES = {
         "builds",
         "each machine on each board that it fits, as `make board` builds it: bitstreams that are "
         "not made or miss the clock of the board at one of three placement seeds; of the Arty A7, "
-        "which no open tool places, netlists that are not made",
+        "which no open tool places, netlists that are not made; a placement that is in "
+        "docs/placements.toml is made again only if nextpnr sees something new",
         "0",
         Quick({"places": False}, "each machine is fitted to its boards and its files are made"),
         0,

@@ -3,7 +3,6 @@
 README's table that is made from it.
 """
 
-import importlib
 import inspect
 import json
 import math
@@ -11,9 +10,8 @@ from datetime import date
 
 import pytest
 
-from boards import build
 from experiments import start_page
-from figures import comparison, record, synthesis, timing
+from figures import comparison, record, synthesis
 from figures import figure as command
 from figures.common import Absent, Figure, Quick, collected, seeds, shares, within
 from tables import readme_figures
@@ -51,18 +49,6 @@ def test_every_figure_has_a_bound_a_short_form_and_words():
 
 def drawn(count=10, seed=1):
     return 100 * seed + count
-
-
-def test_the_timing_reads_no_board_before_its_campaign_is_asked_for(monkeypatch):
-    read = []
-    monkeypatch.setattr(build, "placeable", lambda: read.append("boards") or [])
-    importlib.reload(timing)
-    try:
-        assert not hasattr(timing, "FIGURES") and not read
-        assert timing.CAMPAIGNS["timing"].parts == 10 * len(timing.builds()) and read == ["boards"]
-    finally:
-        monkeypatch.undo()
-        importlib.reload(timing)
 
 
 def test_short_form_and_seed_reach_the_function():

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figure of the boards places a design again only if nextpnr would see something new."""
+"""A design is placed again only if nextpnr would see something new."""
 
+import sys
 from dataclasses import replace
 
 import pytest
 
-from boards import board, build, machine
+from boards import board, build, machine, placements
 from boards.fit import fit
-from figures import boards
 from figures.synthesis import NotEndedError, SynthesisError
 
 NETLIST = """{"cells": {"$auto$rtl/axis.sv:%d$%d": {"type": "LUT4", "parameters": {"INIT": "%s"},
@@ -16,7 +16,7 @@ NETLIST = """{"cells": {"$auto$rtl/axis.sv:%d$%d": {"type": "LUT4", "parameters"
 
 @pytest.fixture
 def design(monkeypatch, tmp_path):
-    monkeypatch.setattr(boards, "RESULTS", tmp_path / "results")
+    monkeypatch.setattr(placements, "RECORD", tmp_path / "placements.toml")
     return fit(board.named("colorlight_i5"), machine.named("mill"))
 
 
@@ -46,47 +46,107 @@ def test_another_option_of_a_tool_is_another_placement(design, option):
     assert build.state(other) != build.state(design)
 
 
-def test_a_design_is_synthesised_again_only_if_its_sources_have_changed(
-    design, monkeypatch, tmp_path
-):
-    calls = []
+class Tools:
+    """In place of Yosys, nextpnr and the packer: what they return or raise."""
 
-    def synthesise():
-        calls.append(1)
-        (tmp_path / "netlist.json").write_text(NETLIST % (1, 1, "0110", 1, 1))
-        return tmp_path / "netlist.json"
+    def __init__(self, monkeypatch, folder):
+        self.netlist, self.mhz = "a", 51.53
+        self.calls = []
+        (folder / build.PLACED).write_text("placed")
+        for name in ("check_tools", "write", "make_firmware", "pack"):
+            monkeypatch.setattr(build, name, lambda *_: folder)
+        monkeypatch.setattr(build, "synthesise", lambda *_: self.calls.append("yosys"))
+        monkeypatch.setattr(build, "netlist_state", lambda *_: self.netlist)
+        monkeypatch.setattr(build, "used", lambda *_: "1 of 2 LUT")
+        monkeypatch.setattr(build, "place", self.place)
 
-    first = boards.netlist_state(design, synthesise)
-    assert boards.netlist_state(design, synthesise) == first and len(calls) == 1
+    def place(self, design, folder, netlist, seed):
+        self.calls.append(seed)
+        if isinstance(self.mhz, Exception):
+            raise self.mhz
+        return self.mhz, {}
+
+
+@pytest.fixture
+def tools(monkeypatch, tmp_path):
+    return Tools(monkeypatch, tmp_path)
+
+
+def test_what_is_in_the_record_is_not_measured_again(design, tools):
+    first = placements.measured(design, [1, 2])
+    assert tools.calls == ["yosys", 1, 2] and first.used == "1 of 2 LUT"
+    assert placements.worst_mhz(first, [1, 2]) == 51.53
+    again = placements.measured(design, [1, 2])
+    assert tools.calls == ["yosys", 1, 2] and placements.worst_mhz(again, [1, 2]) == 51.5
+    placements.measured(design, [3])  # the netlist is not in the record
+    assert tools.calls == ["yosys", 1, 2, "yosys", 3]
+    assert sorted(placements.read()[design.name].seeds) == [1, 2, 3]
+
+
+def test_other_sources_are_placed_again_only_if_the_netlist_is_another(design, tools, monkeypatch):
+    placements.measured(design, [1])
     monkeypatch.setattr(build, "state", lambda _: "other sources")
-    assert boards.netlist_state(design, synthesise) == first and len(calls) == 2
+    placements.measured(design, [1])
+    assert tools.calls == ["yosys", 1, "yosys"]
+    placements.measured(design, [1])
+    assert tools.calls == ["yosys", 1, "yosys"]
+    tools.netlist = "b"
+    monkeypatch.setattr(build, "state", lambda _: "sources of another netlist")
+    placements.measured(design, [2])
+    assert tools.calls == ["yosys", 1, "yosys", "yosys", 2]
+    assert sorted(placements.read()[design.name].seeds) == [2]
 
 
-def test_a_result_is_kept_for_its_seed_and_netlist_alone(design):
-    boards.RESULTS.mkdir()
-    assert boards.once(design, 1, "a", lambda: 51.5) == 51.5
-    assert boards.once(design, 1, "a", lambda: 0) == 51.5
-    assert boards.once(design, 2, "a", lambda: 52.5) == 52.5
-    assert boards.once(design, 1, "b", lambda: 53.5) == 53.5
+def test_each_design_has_its_own_entry(design, tools):
+    other = fit(board.named("colorlight_i9"), machine.named("mill"))
+    placements.measured(design, [1])
+    tools.mhz = 60.0
+    placements.measured(other, [1])
+    found = {name: one.seeds[1].mhz for name, one in placements.read().items()}
+    assert found == {design.name: 51.5, other.name: 60.0}
 
 
-def test_a_tool_that_failed_is_a_result_too(design):
-    boards.RESULTS.mkdir()
+def test_a_tool_that_failed_is_a_result_too(design, tools):
+    tools.mhz = SynthesisError("it's no way through the part")
+    placements.measured(design, [1])
+    known = placements.measured(design, [1])
+    assert tools.calls == ["yosys", 1]
+    with pytest.raises(SynthesisError, match="it.s no way through"):
+        placements.worst_mhz(known, [1])
+    assert "no way through" in placements.too_slow(design, known, [1])
 
-    def fails():
-        raise SynthesisError("no way through the part")
 
-    for measure in (fails, lambda: 51.5):
-        with pytest.raises(SynthesisError, match="no way through"):
-            boards.once(design, 1, "a", measure)
-
-
-def test_a_tool_that_did_not_end_in_time_is_run_again(design):
-    boards.RESULTS.mkdir()
-
-    def takes_long():
-        raise NotEndedError("place and route has not ended after 180 minutes")
-
+def test_a_tool_that_did_not_end_in_time_is_run_again(design, tools):
+    tools.mhz = NotEndedError("place and route has not ended after 180 minutes")
     with pytest.raises(NotEndedError):
-        boards.once(design, 1, "a", takes_long)
-    assert boards.once(design, 1, "a", lambda: 51.5) == 51.5
+        placements.measured(design, [1])
+    tools.mhz = 51.5
+    assert placements.measured(design, [1]).seeds[1].mhz == 51.5
+
+
+def test_a_missing_seed_is_no_good_build(design, tools):
+    known = placements.measured(design, [1])
+    assert placements.too_slow(design, known, [1]) == ""
+    assert placements.too_slow(design, known, [1, 3]) == "not placed yet with seed 3"
+    tools.mhz = 49.9
+    slow = placements.measured(design, [1, 2])
+    assert placements.too_slow(design, slow, [1, 2]) == "49.9 MHz, 50 are needed"
+
+
+@pytest.mark.parametrize(
+    "words, said, code",
+    [
+        ([], "1 of 1 builds are good", 0),
+        (["i5", "--minutes", "0"], "colorlight_i5-mill: not begun in time", 1),
+        (["i7"], "no build has i7 in its name", 1),
+    ],
+)
+def test_make_boards_says_which_builds_are_not_good(
+    design, tools, monkeypatch, capsys, words, said, code
+):
+    monkeypatch.setattr(build, "fitting", lambda: ([design], []))
+    monkeypatch.setattr(sys, "argv", ["placements", *words])
+    with pytest.raises(SystemExit) as ended:
+        placements.main()
+    shown = capsys.readouterr().out + str(ended.value.code)
+    assert said in shown and bool(ended.value.code) == bool(code)

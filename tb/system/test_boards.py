@@ -18,10 +18,9 @@ from amaranth_boards.icebreaker import ICEBreakerPlatform
 from amaranth_boards.tang_nano_9k import TangNano9kPlatform
 from amaranth_boards.ulx3s import ULX3S_25F_Platform, ULX3S_85F_Platform
 
-from boards import board, build, clocks, generate, machine, size
+from boards import board, build, clocks, generate, machine, placements, size
 from boards.fit import fit
 from boards.toml_file import Misfit
-from figures import boards as figures_of_boards
 from figures import synthesis
 from figures.boards import boards_failed
 from figures.synthesis import SynthesisError
@@ -535,10 +534,12 @@ def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
     designs = [next(one for one in DESIGNS if one.board.name == name) for name in names]
     monkeypatch.setattr(build, "fitting", lambda: (designs, []))
     for name in ("check_tools", "write", "make_firmware", "synthesise", "pack"):
-        monkeypatch.setattr(build, name, lambda *_: Path("none"))
+        monkeypatch.setattr(build, name, lambda *_: tmp_path)
+    (tmp_path / build.PLACED).write_text("placed")
+    monkeypatch.setattr(build, "cells", lambda _: "1 LUT")
     monkeypatch.setattr(build, "place", place)
     monkeypatch.setattr(build, "netlist_state", lambda design, _: design.name)
-    monkeypatch.setattr(figures_of_boards, "RESULTS", tmp_path)
+    monkeypatch.setattr(placements, "RECORD", tmp_path / "placements.toml")
     assert boards_failed() == failed
     monkeypatch.setattr(build, "place", no_more)  # each placement was kept
     assert boards_failed() == failed
