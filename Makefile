@@ -92,7 +92,7 @@ tables: $(SETUP)  ## write the made files again: registers, line, tables of numb
 
 fresh: $(SETUP)
 	$(call say,made files are fresh)
-	@stale=0; for table in $(call module,$(GENERATORS)); do $(PYTHON) -m $$table --check || stale=1; done; exit $$stale
+	@printf '%s\n' $(call module,$(GENERATORS)) | xargs -P $(JOBS) -I{} $(PYTHON) -m {} --check
 
 firmware: $(SETUP)   ## the soft core's program, build/firmware/firmware.hex; BOARD=x MACHINE=y: into the bitstream of `make board`
 	@$(if $(BOARD)$(MACHINE),$(PYTHON) -m boards.build --firmware --board '$(BOARD)' --machine '$(MACHINE)',$(PYTHON) -m firmware.build --out build/firmware)
