@@ -15,6 +15,7 @@ import pytest
 from amaranth_boards.arty_a7 import ArtyA7_35Platform
 from amaranth_boards.ice40_hx8k_b_evn import ICE40HX8KBEVNPlatform
 from amaranth_boards.icebreaker import ICEBreakerPlatform
+from amaranth_boards.orangecrab_r0_2 import OrangeCrabR0_2_25FPlatform
 from amaranth_boards.tang_nano_9k import TangNano9kPlatform
 from amaranth_boards.ulx3s import ULX3S_25F_Platform, ULX3S_85F_Platform
 
@@ -707,6 +708,18 @@ def test_the_pins_of_the_arty_are_those_of_amaranth():
         assert [pad.ball] == resource(platform, "led", n)
     device = f"{platform.device}{platform.package}-{platform.speed}"
     assert ours.part.device.lower() == device.lower()
+
+
+def test_the_pins_of_the_orangecrab_are_those_of_amaranth():
+    ours, platform = board.named("orangecrab"), OrangeCrabR0_2_25FPlatform
+    theirs, names = pins_of(platform, 0), {"miso": "cipo", "mosi": "copi"}
+    found = {names.get(pin, pin): pad.ball for pin, pad in ours.connectors["IO"].items()}
+    assert found == theirs
+    assert [ours.clock.ball] == resource(platform, "clk")
+    leds = {"drive_fault": "r", "running": "g", "sending": "b"}
+    for mine, colour in leds.items():
+        assert ours.leds[mine].ball == signal(platform, "rgb_led", colour)
+    assert ours.part.name == f"{platform.device}-{platform.speed}{platform.package}C"
 
 
 def test_the_pins_of_the_tang_nano_9k_are_those_of_amaranth():
