@@ -51,15 +51,21 @@ ACCESSES = f"{CORE}mem_valid & {CORE}mem_addr >> 31"  # a register; it may wait 
 WAITS = f"vlSelfRef.node__DOT__core_waits & {ACCESSES}"
 ALWAYS = "1U"
 SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
-# What may change while the soft core accesses no register: counters in any case; the core itself;
+# What may change while the soft core accesses no register: counters in any case; the core itself,
+# and with it what receives and sends the bits of a bus, which has nothing to do most of the time;
 # the motion engine until there is nothing to do for it; the axes while they move, and for some
 # cycles of each sample; the way of a sample from a converter to the position. A register that is
 # missing here costs time only; tb/twin/test_rising_edge.py sees it.
 COUNTERS = (
     r"u_tick__\w+|u_sample_tick__\w+|u_limit_tick__\w+|u_core_wait__\w+|u_engine__DOT__elapsed|"
-    r"u_lines__\w+|u_filter__DOT__(?:skipped|due)|u_watchdog__DOT__part|since"
+    r"u_lines__\w+|u_filter__DOT__(?:skipped|due)|u_(?:watchdog|heartbeat)__DOT__part|since|"
+    r"u_bridge__DOT__elapsed"
 )
 SOFT_CORE = r"u_core__\w+"
+LINE = (
+    r"u_receiver__\w+|u_transmitter__DOT__(?:part|u_timer__\w+)|u_break__DOT__low|"
+    r"u_timeout__DOT__spent"
+)
 SELDOM = re.compile(r"__DOT__master_(?:address|wdata)$")  # they are 0 but for an access of the core
 ENGINE = r"u_engine__DOT__(?!u_settings)\w+|result|result_\w+"
 AXES = (
@@ -500,12 +506,17 @@ def function(design: Design) -> str:
     fetched = [name for name in design.types if FETCHED.search(name)]
     if any(ADC.search(name) for name in design.types):
         active = [
-            works(SOFT_CORE, ENGINE, AXES, SINE),
+            works(SOFT_CORE, LINE, ENGINE, AXES, SINE),
             works(ENGINE, AXES, SINE),
             works(AXES, SINE),
         ]
     else:
-        active = [works(SOFT_CORE, ENGINE, AXES), works(ENGINE, AXES), works(ENGINE), works()]
+        active = [
+            works(SOFT_CORE, LINE, ENGINE, AXES),
+            works(ENGINE, AXES),
+            works(ENGINE),
+            works(),
+        ]
     if not fetched:
         active.pop()  # there is no engine
     edges = Edges(design, program, len(logic), active)
@@ -518,7 +529,11 @@ def function(design: Design) -> str:
     lines.append(f"static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{")
     lines += [f"if ({edges.known(last)} && edge_{last}(vlSelfRef, rest)) return;"]
     for number in reversed(range(1, last)):
-        lines += [f"rest.known_{number} = false;", f"if ({edges.known(number)}) {{"]
+        lines.append(f"rest.known_{number} = false;")
+        if number == 1:  # an access wakes what rests
+            lines += [f"if (({accesses}) & !({waits})) {{", "rest.known_0 = false;"]
+            lines += ["edge_0(vlSelfRef, rest);", "return;", "}"]
+        lines.append(f"if ({edges.known(number)}) {{")
         if number == last - 1 and fetched:
             line = fetched[0]
             lines += [
@@ -531,13 +546,5 @@ def function(design: Design) -> str:
         else:
             lines += edges.observed(number)
         lines.append("}")
-    lines += [
-        "rest.known_0 = false;",
-        f"if (({accesses}) & !({waits})) {{",
-        "edge_0(vlSelfRef, rest);",
-        "return;",
-        "}",
-        *edges.observed(0),
-        "}",
-    ]
+    lines += ["rest.known_0 = false;", *edges.observed(0), "}"]
     return "\n".join(lines) + "\n"
