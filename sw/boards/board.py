@@ -24,12 +24,18 @@ ON_BOARD = {
 FLASH = tuple(name for name in ON_BOARD if name.startswith("flash"))
 # pads of an Ethernet PHY, by the interface: how many, and their direction
 ETHERNET = {
+    "mii": {
+        **{"reference": (1, "out"), "reset_n": (1, "out")},
+        **{"rx_clk": (1, "in"), "rx_dv": (1, "in"), "rx_data": (4, "in")},
+        **{"tx_clk": (1, "in"), "tx_en": (1, "out"), "tx_data": (4, "out")},
+    },
     "rgmii": {
         **{"rx_clk": (1, "in"), "rx_ctl": (1, "in"), "rx_data": (4, "in")},
         **{"tx_clk": (1, "out"), "tx_ctl": (1, "out"), "tx_data": (4, "out")},
     },
 }
-ETHERNET_HZ = 125_000_000  # of its clock
+OF_THE_TOP = ("reference", "reset_n")  # of these, what the top drives and not the Ethernet core
+ETHERNET_HZ = {"mii": 25_000_000, "rgmii": 125_000_000}  # of its clocks
 MOST_DELAY_NS = 3.1  # of a pin of the ECP5
 PULLS = ("up", "down", "none")
 DIRECTIONS = ("both", "in", "out")
@@ -69,10 +75,24 @@ class Ethernet:
     """The PHY of a board."""
 
     interface: str
-    tx_delay_ns: float  # by which the FPGA delays the clock to the PHY
+    tx_delay_ns: float  # by which the FPGA delays the clock to the PHY, with rgmii
     rx_delay_ns: float  # by which it delays the data from the PHY
     pads: dict[str, Pad]  # by the port of the top
     ports: dict[str, str]  # {pads of the Ethernet core: ports of the top}
+
+    @property
+    def hz(self) -> int:
+        """Of the clocks of the interface."""
+        return ETHERNET_HZ[self.interface]
+
+    @property
+    def clocks(self) -> list[str]:
+        """Ports of the top at which the PHY gives a clock."""
+        return [
+            port
+            for port, pad in self.pads.items()
+            if port.endswith("_clk") and pad.direction == "in"
+        ]
 
 
 @dataclass(frozen=True)
@@ -167,7 +187,9 @@ def ethernet_of(table: Table) -> Ethernet | None:
     interface = table.take("interface", str)
     if interface not in ETHERNET:
         raise table.misfit(f"interface {interface!r} is none of {', '.join(ETHERNET)}")
-    tx, rx = table.take("tx_delay_ns", float), table.take("rx_delay_ns", float)
+    tx = rx = 0.0
+    if interface == "rgmii":
+        tx, rx = table.take("tx_delay_ns", float), table.take("rx_delay_ns", float)
     if not (0 <= tx <= MOST_DELAY_NS and 0 <= rx <= MOST_DELAY_NS):
         raise table.misfit(f"tx_delay_ns and rx_delay_ns must be 0 to {MOST_DELAY_NS:g}")
     pads: dict[str, Pad] = {}
@@ -178,9 +200,18 @@ def ethernet_of(table: Table) -> Ethernet | None:
             raise table.misfit(f"{name} must name {count} pin{'s' * (count > 1)}")
         numbered = [f"eth_{name}" + (f"_{n}" if count > 1 else "") for n in range(count)]
         pads |= {
-            port: Pad(ball, f"PHY {name}", direction, fast=True)
+            # low at the end of the reset, rx_dv also chooses mii of a PHY that has rmii, too
+            port: Pad(
+                ball,
+                f"PHY {name}",
+                direction,
+                pull="down" if name == "rx_dv" else "none",
+                fast=True,
+            )
             for port, ball in zip(numbered, balls, strict=True)
         }
+        if name in OF_THE_TOP:
+            continue
         inside = {"rx_clk": "clocks_rx", "tx_clk": "clocks_tx"}.get(name, f"pads_{name}")
         joined = ", ".join(reversed(numbered))
         ports[inside] = f"{{{joined}}}" if count > 1 else joined
@@ -293,6 +324,12 @@ def load(path: Path) -> Board:
     for each in (buffer, clock, switches, table):
         each.close()
     check_balls(board)
+    if board.ethernet and "eth_reference" in board.ethernet.pads:
+        needed = 2 * board.ethernet.hz
+        if board.node_hz != needed:
+            raise table.misfit(
+                f"[clock] node_hz must be {needed}: the reference of the PHY is half of it"
+            )
     return board
 
 

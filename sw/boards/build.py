@@ -40,7 +40,8 @@ from firmware import build as firmware
 
 OUT = ROOT / "build" / "boards"
 NOTE = "note"  # of what the bitstream in a folder was made of
-FLIP_FLOPS = "+/ecp5/cells_sim.v"  # primitives of the Ethernet core besides those of the family
+# primitives of the Ethernet core besides those of the family
+FLIP_FLOPS = {"ecp5": "+/ecp5/cells_sim.v", "xc7": "+/xilinx/cells_sim.v"}
 PLACED, FILLED = "placed", "filled"  # files of nextpnr: with the placeholder, with the firmware
 KINDS = {  # of cells of a 7-series part, by the beginning of their names
     "LUT": "LUT",
@@ -119,7 +120,7 @@ def synthesise(design: Design, folder: Path) -> Path:
     first = family.read_cells
     if design.ethernet:
         core = (folder / f"{ethernet.NAME}.v").relative_to(ROOT)
-        first += f"; read_verilog -lib {FLIP_FLOPS}; read_verilog {core}"
+        first += f"; read_verilog -lib {FLIP_FLOPS[family.name]}; read_verilog {core}"
     return yosys(folder / "top.sv", {}, last, f"board-{design.name}", first)
 
 

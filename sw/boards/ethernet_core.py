@@ -5,8 +5,8 @@ link of rtl/node.sv.
     PYTHONPATH=build/litex python -m boards.ethernet_core INTERFACE FAMILY CLK_HZ TX_NS RX_NS FILE
 
 INTERFACE to the PHY: mii (100 Mbit/s), rgmii (1 Gbit/s), or wide_mii, which is mii with the data
-path of rgmii. FAMILY: ecp5 or simulation. TX_NS and RX_NS: by how many nanoseconds the FPGA delays
-the clock to the PHY and the data from it, with rgmii. The file is Verilog with one module,
+path of rgmii. FAMILY: ecp5, xc7 or simulation. TX_NS and RX_NS: by how many nanoseconds the FPGA
+delays the clock to the PHY and the data from it, with rgmii. The file is Verilog with one module,
 `ethernet_core`; its port `udp` has the signals of the node's port as seen from the node.
 `boards.ethernet` runs this; `make litex` fetches LiteX and LiteEth.
 """
@@ -22,6 +22,7 @@ from liteeth.core import LiteEthUDPIPCore
 from litex.build.generic_platform import GenericPlatform, Pins, Subsignal
 from litex.build.lattice.platform import LatticePlatform
 from litex.build.sim.common import sim_special_overrides
+from litex.build.xilinx import Xilinx7SeriesPlatform
 from litex.gen import LiteXModule
 from litex.soc.interconnect import stream
 from litex.soc.interconnect.packet import PacketFIFO
@@ -144,6 +145,8 @@ def verilog(interface: str, family: str, clk_hz: int, delays: Sequence[float]) -
     io = [*IO, CLOCKS, pads(interface)]
     if family == "ecp5":
         platform: Any = LatticePlatform("LFE5U-25F-6BG381C", io, toolchain="trellis")
+    elif family == "xc7":
+        platform = Xilinx7SeriesPlatform("xc7a35ticsg324-1L", io, toolchain="vivado")
     else:
         platform = GenericPlatform("simulation", io)
     core = EthernetCore(platform, interface, clk_hz, delays)

@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from boards import block_ram
-from boards.board import ETHERNET_HZ, FLASH, LEDS, Pad
+from boards.board import FLASH, LEDS, Pad
 from boards.fit import PLACEHOLDER, Connection, Design
 from boards.machine import AXIS_SIGNALS, NODE_SIGNALS, PERIPHERALS, RELAY_SIGNALS
 from moire.analysis.loopback import GROUND, PLUG
@@ -75,9 +75,9 @@ def pins(design: Design) -> list[Pin]:
             timing = ", synchronous to flash_sclk" if timed else ""
             found.append(Pin(name, pad.direction, pad, f"pin {pad.ball}{timing}"))
     if design.ethernet:
-        clock = "synchronous to eth_rx_clk, of the Ethernet PHY"
+        clocks = " and ".join(design.ethernet.clocks)
         found += [
-            Pin(port, pad.direction, pad, f"pin {pad.ball}, {clock}")
+            Pin(port, pad.direction, pad, f"pin {pad.ball}, {pad.place}, synchronous to {clocks}")
             for port, pad in design.ethernet.pads.items()
         ]
     found += [
@@ -174,6 +174,8 @@ def assigned(design: Design) -> dict[str, str]:
         found |= {name: f"node_{output}" for name, output in RELAY_FLASH.items()}
     elif design.machine.has_flash:
         found |= {name: f"node_{name}" for name in NODE_OUTPUTS if name.startswith("flash")}
+    if design.ethernet and "eth_reference" in design.ethernet.pads:
+        found |= {"eth_reference": "reference", "eth_reset_n": "!rst"}
     number = {axis.name: n for n, axis in enumerate(design.machine.axes)}
     for one in design.connections:
         if one.signal.direction == "out":
@@ -315,7 +317,7 @@ def files(design: Design) -> dict[str, str]:
         **more,
         "top.sv": top(design),
         constraints: TEMPLATES.get_template(f"{constraints}.jinja").render(
-            d=design, pins=pins(design), ethernet_hz=ETHERNET_HZ
+            d=design, pins=pins(design)
         ),
         "wiring.svg": svg(design),
         "wiring.html": page(design),

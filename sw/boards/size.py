@@ -24,7 +24,7 @@ FEATURES = {
 STEPPER = 730  # in an axis that has another drive
 PERIPHERALS = 3033  # all six (docs/peripherals.md); one alone was not measured
 LINK = 1296  # the real-time link
-ETHERNET = 4837  # core of LiteEth for RGMII, as synthesised
+ETHERNET = {"mii": 3427, "rgmii": 4837}  # core of LiteEth by the interface, as synthesised
 SET_POINTS, SET_POINTS_AXIS = 3827, 353  # of the first axis that has them, of each further one
 # Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of ten nodes)
 MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
@@ -84,8 +84,8 @@ def ecp5_block_ram(machine: Machine) -> int:
     return found
 
 
-def estimate(family: str, machine: Machine) -> Size:
-    """The size of a node for this machine."""
+def estimate(family: str, machine: Machine, interface: str = "rgmii") -> Size:
+    """The size of a node for this machine; over Ethernet, with this interface to the PHY."""
     axes = machine.axes
     if machine.orders:
         return Size(RELAY, RELAY_BLOCK_RAM)
@@ -103,7 +103,7 @@ def estimate(family: str, machine: Machine) -> Size:
     shared += PERIPHERALS * any(name not in LINKS for name in machine.peripherals)
     linked = any(name in LINKS for name in machine.peripherals) or bool(machine.ip_address)
     shared += LINK * linked
-    shared += ETHERNET * bool(machine.ip_address)
+    shared += ETHERNET[interface] * bool(machine.ip_address)
     if followers := sum(axis.has("set_points") for axis in axes):
         shared += SET_POINTS + (followers - 1) * SET_POINTS_AXIS
     return Size(shared + sum(map(axis_lut, axes)), block_ram)

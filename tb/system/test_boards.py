@@ -322,6 +322,33 @@ def test_a_link_over_ethernet_has_the_pins_of_the_phy_and_its_clock(name, balls,
     assert "eth_" not in plain["pins.lpf"] and "ethernet_core" not in plain["top.sv"]
 
 
+def test_a_phy_with_mii_has_its_clocks_and_takes_its_own_from_the_node(tmp_path):
+    arty = board.named("arty_a7_35t")
+    made = generate.files(fit(arty, machine.load(over_ethernet(tmp_path))))
+    top, xdc = made["top.sv"], made["pins.xdc"]
+    assert ".clocks_rx(eth_rx_clk)," in top and ".clocks_tx(eth_tx_clk)," in top
+    data = ", ".join(f"eth_tx_data_{n}" for n in (3, 2, 1, 0))
+    assert f".pads_tx_data({{{data}}})," in top
+    assert "always_ff @(posedge clk) reference <= !reference;" in top and arty.node_hz == 50_000_000
+    assert "assign eth_reference = reference;" in top and "assign eth_reset_n = !rst;" in top
+    assert "reference(" not in top, "the core has no such pad"
+    for clock in ("eth_rx_clk", "eth_tx_clk"):
+        assert f"create_clock -name {clock} -period 40.0 [get_ports {clock}]" in xdc
+    assert "clock] -group eth_rx_clk -group eth_tx_clk\n" in xdc
+    assert "PULLTYPE PULLDOWN} [get_ports eth_rx_dv]" in xdc
+    assert "DRIVE 8 SLEW FAST} [get_ports eth_tx_en]" in xdc
+    plain = generate.files(fit(arty, machine.named("mill")))
+    assert "eth_" not in plain["pins.xdc"] + plain["top.sv"]
+
+
+def test_a_node_that_cannot_make_the_clock_of_the_phy_is_refused(tmp_path):
+    change = ("node_hz = 50_000_000", "node_hz = 40_000_000")
+    path = edited(tmp_path, "constraints/arty_a7_35t/board.toml", change)
+    assert refusal(lambda: board.load(path)) == (
+        f"{path}: [clock] node_hz must be 50000000: the reference of the PHY is half of it"
+    )
+
+
 def test_the_delays_of_the_phy_are_in_the_range_of_the_part(tmp_path):
     path = edited(
         tmp_path, "constraints/colorlight_i5/board.toml", ("rx_delay_ns = 2.0", "rx_delay_ns = 4")
@@ -413,7 +440,7 @@ def test_a_link_over_ethernet_needs_a_phy_and_no_serial_line(tmp_path):
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        ('interface = "rgmii"', 'interface = "mii"', "interface 'mii' is none of rgmii"),
+        ('interface = "rgmii"', 'interface = "sgmii"', "interface 'sgmii' is none of mii, rgmii"),
         ('"K2", "L1", "N1", "P1"', '"K2", "L1", "N1"', "rx_data must name 4 pins"),
         ('tx_clk = ["G1"]', 'tx_clk = ["ZZ"]', "has no pin ZZ"),
     ],
@@ -594,6 +621,18 @@ def test_the_block_rams_are_those_of_netlists(tmp_path):
     ]
 
 
+def test_the_size_of_the_link_over_ethernet_is_that_of_the_interface(tmp_path):
+    """The core for MII is smaller: 3427 LUT4 against 4837 for RGMII, synthesised."""
+    mill = machine.load(over_ethernet(tmp_path))
+    arty, plain = (
+        fit(board.named("arty_a7_35t"), mill),
+        fit(board.named("arty_a7_35t"), machine.named("mill")),
+    )
+    assert arty.estimate.lut - plain.estimate.lut == size.LINK + 3427
+    i5 = fit(board.named("colorlight_i5"), mill).estimate.lut
+    assert i5 - arty.estimate.lut == 4837 - 3427
+
+
 def test_a_node_with_set_points_and_the_real_time_link_has_their_size():
     """Three axes, synthesised: 13 996 LUT4 with the set-points, 9464 without."""
     plain, stream = (
@@ -706,6 +745,15 @@ def test_the_pins_of_the_arty_are_those_of_amaranth():
         assert [pad.ball] == resource(platform, "switch", n)
     for n, pad in enumerate(ours.leds.values()):
         assert [pad.ball] == resource(platform, "led", n)
+    assert ours.ethernet
+    phy = {port: pad.ball for port, pad in ours.ethernet.pads.items()}
+    assert [phy.pop("eth_reference")] == resource(platform, "eth_clk25")
+    mii = next(each for each in platform.resources if each.name == "eth_mii")
+    theirs = {part.name: part.ios[0].names for part in mii.ios}
+    assert [phy.pop("eth_reset_n")] == theirs["rst"]
+    for name in ("rx_clk", "rx_dv", "rx_data", "tx_clk", "tx_en", "tx_data"):
+        balls = [ball for port, ball in phy.items() if port.startswith(f"eth_{name}")]
+        assert balls == theirs[name]
     device = f"{platform.device}{platform.package}-{platform.speed}"
     assert ours.part.device.lower() == device.lower()
 

@@ -211,6 +211,13 @@ def test_the_pins_of_rgmii_are_delayed_in_steps_of_25_ps():
 
 
 @needs_litex
+def test_the_core_for_the_arty_is_made_of_its_flip_flops():
+    """The resets of both clocks of the PHY are synchronised by flip-flops with a set."""
+    text = ethernet.core("mii", "xc7", 50_000_000).read_text()
+    assert len(re.findall(r"^FDPE ", text, re.M)) >= 4 and "TRELLIS" not in text
+
+
+@needs_litex
 def test_a_core_that_cannot_be_made_is_refused():
     with pytest.raises(Misfit, match="(?s)LiteEth has not made the Ethernet core: .*sgmii"):
         ethernet.core("sgmii", "simulation", 50_000_000)
