@@ -193,6 +193,7 @@ def test_while_a_drive_is_on_only_its_host_is_heard(node):
 def test_a_host_that_does_not_answer_arp_stops_the_link_only_for_a_while(node):
     silent, host, link = Host(node, 9), Host(node), set_up(node)
     silent.silent = True
+    assert link.reply(host.link(link.request(0, [3, 0]))), "from now on its MAC address is known"
     assert not [one for one in silent.ask(silent.datagram(link.request(0, [1, 0]))) if UDP in one]
     assert host.link(link.request(0, [2, 0])) is None
     node.run(ARP_S * CLK_HZ // SHORTER)
