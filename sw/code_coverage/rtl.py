@@ -15,6 +15,7 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections import defaultdict
 from collections.abc import Iterable
@@ -32,6 +33,9 @@ ARMS = ("elsif", "case")  # that Verilator counts as lines, and are branches
 LONGEST_S = 3 * 3600  # of a file of tests
 SIMULATES = re.compile(r"^from tb(\.bench import (.*|\([^)]*)\brun\b| import bench$)", re.MULTILINE)
 POINT = re.compile(r"C '(.*)' (\d+)")
+# Python 3.11 counts the depth of what ast.parse makes for all threads together. If another thread
+# begins one while the garbage of this one is collected, it ends with a SystemError.
+parsing = threading.Lock()
 
 
 def directories() -> list[str]:
@@ -59,7 +63,9 @@ def imported(test: Path) -> set[Path]:
         if path in found or not path.is_file():
             continue
         found.add(path)
-        for node in ast.walk(ast.parse(path.read_text())):
+        with parsing:
+            tree = ast.parse(path.read_text())
+        for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "tb":
                 names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
                 left += [ROOT / f"{str(name).replace('.', '/')}.py" for name in names]

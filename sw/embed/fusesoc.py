@@ -19,7 +19,7 @@ import xml.etree.ElementTree
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import IO
 
@@ -62,7 +62,7 @@ class Core:
         """The core file."""
         return self.source.with_suffix(".core")
 
-    @property
+    @cached_property
     def tests(self) -> Tests | None:
         """The cocotb tests that its simulation runs, if there are any."""
         return tests_of.of(self.module)
@@ -311,6 +311,7 @@ def wrong(
     chosen: Sequence[Core], seed: int = 1, jobs: int = 2, steps: Sequence[str] = STEPS
 ) -> list[str]:
     """What is wrong with lint and simulation of these cores, a line each."""
+    # all tests are found before the threads begin: see code_coverage.rtl.parsing
     runs = [(core, step) for core in chosen for step in steps if step == "lint" or core.tests]
     with ThreadPoolExecutor(jobs) as pool:
         return [why for why in pool.map(lambda one: run(one[0], one[1], seed), runs) if why]

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the coverage counts, what it leaves out with a reason, and which holes its page names."""
 
+import ast
+import gc
 import json
 import os
 import shutil
 import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -214,3 +218,41 @@ def test_a_block_without_a_test_is_named():
     assert "rtl/node.sv" in rtl.not_simulated([NAME])
     assert NAME not in rtl.not_simulated([NAME])
     assert os.path.join("sw", "firmware", "bus", "bus.c") in software.not_built([])
+
+
+CLEANS_UP = 1e-4  # s
+
+
+class Garbage:
+    """When it is collected, another thread runs for a while."""
+
+    def __init__(self):
+        self.itself = self
+
+    def __del__(self):
+        time.sleep(CLEANS_UP)
+
+
+def test_tests_are_read_by_several_threads_while_garbage_is_collected(monkeypatch):
+    """Python 3.11 fails in ast.parse if another thread begins one in the middle of it."""
+    parse, before, tests = ast.parse, gc.get_threshold(), rtl.test_files()[:40]
+
+    def parse_with_garbage(text):
+        for _ in range(3):
+            Garbage()
+        return parse(text)
+
+    def fault(test):
+        try:
+            return "" if test in rtl.imported(test) else f"{test} is missing"
+        except SystemError as why:
+            return str(why)
+
+    gc.set_threshold(50)
+    try:
+        with monkeypatch.context() as changes, ThreadPoolExecutor(8) as pool:
+            changes.setattr(rtl.ast, "parse", parse_with_garbage)
+            faults = set(pool.map(fault, tests))
+    finally:
+        gc.set_threshold(*before)
+    assert faults == {""}
