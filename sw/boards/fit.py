@@ -305,8 +305,8 @@ def fit(board: Board, machine: Machine) -> Design:
         check_volts(board, machine, one)
     check_bus(board, machine)
     check_ethernet(board, machine)
-    interface = {"interface": board.ethernet.interface} if board.ethernet else {}
-    needed = size.estimate(board.part.family.name, machine, **interface)
+    interface = board.ethernet.interface if board.ethernet else ""
+    needed = size.estimate(board.part.family.name, machine, interface)
     check_part(board, machine, needed)
     pll = clocks.pll(board.part.family.plls, board.clock_hz, board.node_hz, board.file)
     turned = wiring_for(board, machine).turned

@@ -84,7 +84,7 @@ def ecp5_block_ram(machine: Machine) -> int:
     return found
 
 
-def estimate(family: str, machine: Machine, interface: str = "rgmii") -> Size:
+def estimate(family: str, machine: Machine, interface: str = "") -> Size:
     """The size of a node for this machine; over Ethernet, with this interface to the PHY."""
     axes = machine.axes
     if machine.orders:
@@ -103,7 +103,8 @@ def estimate(family: str, machine: Machine, interface: str = "rgmii") -> Size:
     shared += PERIPHERALS * any(name not in LINKS for name in machine.peripherals)
     linked = any(name in LINKS for name in machine.peripherals) or bool(machine.ip_address)
     shared += LINK * linked
-    shared += ETHERNET[interface] * bool(machine.ip_address)
+    if machine.ip_address:
+        shared += ETHERNET[interface]
     if followers := sum(axis.has("set_points") for axis in axes):
         shared += SET_POINTS + (followers - 1) * SET_POINTS_AXIS
     return Size(shared + sum(map(axis_lut, axes)), block_ram)
