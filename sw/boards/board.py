@@ -36,6 +36,7 @@ ETHERNET = {
 }
 OF_THE_TOP = ("reference", "reset_n")  # of these, what the top drives and not the Ethernet core
 ETHERNET_HZ = {"mii": 25_000_000, "rgmii": 125_000_000}  # of its clocks
+ETHERNET_FAMILIES = {"mii": ("ecp5", "xc7"), "rgmii": ("ecp5",)}  # for which LiteEth makes its core
 MOST_DELAY_NS = 3.1  # of a pin of the ECP5
 PULLS = ("up", "down", "none")
 DIRECTIONS = ("both", "in", "out")
@@ -257,6 +258,22 @@ def check_balls(board: Board) -> None:
             )
 
 
+def check_phy(board: Board) -> None:
+    """Refuses a PHY that the part cannot serve."""
+    phy, family = board.ethernet, board.part.family.name
+    if phy is None:
+        return
+    if family not in ETHERNET_FAMILIES[phy.interface]:
+        raise Misfit(
+            f"{board.file}: [ethernet] {phy.interface} is not built for the family {family}"
+        )
+    if "eth_reference" in phy.pads and board.node_hz != 2 * phy.hz:
+        raise Misfit(
+            f"{board.file}: [clock] node_hz must be {2 * phy.hz}: the reference of the PHY is half "
+            "of it"
+        )
+
+
 def names() -> list[str]:
     """All boards of the project."""
     return sorted(path.parent.name for path in FOLDER.glob("*/board.toml"))
@@ -324,12 +341,7 @@ def load(path: Path) -> Board:
     for each in (buffer, clock, switches, table):
         each.close()
     check_balls(board)
-    if board.ethernet and "eth_reference" in board.ethernet.pads:
-        needed = 2 * board.ethernet.hz
-        if board.node_hz != needed:
-            raise table.misfit(
-                f"[clock] node_hz must be {needed}: the reference of the PHY is half of it"
-            )
+    check_phy(board)
     return board
 
 

@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from boards import block_ram
-from boards.board import FLASH, LEDS, Pad
+from boards.board import FLASH, LEDS, OF_THE_TOP, Pad
 from boards.fit import PLACEHOLDER, Connection, Design
 from boards.machine import AXIS_SIGNALS, NODE_SIGNALS, PERIPHERALS, RELAY_SIGNALS
 from moire.analysis.loopback import GROUND, PLUG
@@ -75,11 +75,10 @@ def pins(design: Design) -> list[Pin]:
             timing = ", synchronous to flash_sclk" if timed else ""
             found.append(Pin(name, pad.direction, pad, f"pin {pad.ball}{timing}"))
     if design.ethernet:
-        clocks = " and ".join(design.ethernet.clocks)
-        found += [
-            Pin(port, pad.direction, pad, f"pin {pad.ball}, {pad.place}, synchronous to {clocks}")
-            for port, pad in design.ethernet.pads.items()
-        ]
+        of_phy = f", synchronous to {' and '.join(design.ethernet.clocks)}"
+        for port, pad in design.ethernet.pads.items():
+            timing = "" if port.removeprefix("eth_") in OF_THE_TOP else of_phy
+            found.append(Pin(port, pad.direction, pad, f"pin {pad.ball}, {pad.place}{timing}"))
     found += [
         Pin(f"address_{n}", "in", pad, f"static: switch, bit {n} of the address on the bus")
         for n, pad in enumerate([] if design.machine.orders else board.address)

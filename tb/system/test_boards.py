@@ -349,6 +349,17 @@ def test_a_node_that_cannot_make_the_clock_of_the_phy_is_refused(tmp_path):
     )
 
 
+def test_an_interface_that_the_family_has_no_core_for_is_refused(tmp_path):
+    i5 = "constraints/colorlight_i5/board.toml"
+    phy = Path(i5).read_text().partition("[ethernet]")[2].partition("\n\n")[0]
+    arty = Path("constraints/arty_a7_35t/board.toml").read_text()
+    mine = arty.partition("[ethernet]")[2].partition("\n\n")[0]
+    path = edited(tmp_path, "constraints/arty_a7_35t/board.toml", (mine, phy))
+    path.write_text(re.sub(r'"(H2|P2|K2|L1|N1|P1|G1|K1|H1|J1|J3)"', '"G16"', path.read_text()))
+    found = refusal(lambda: board.load(path))
+    assert found == f"{path}: [ethernet] rgmii is not built for the family xc7"
+
+
 def test_the_delays_of_the_phy_are_in_the_range_of_the_part(tmp_path):
     path = edited(
         tmp_path, "constraints/colorlight_i5/board.toml", ("rx_delay_ns = 2.0", "rx_delay_ns = 4")
