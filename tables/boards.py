@@ -92,7 +92,8 @@ def placed_row(one: Design, known: Build) -> list[str]:
     mhz = [each.mhz for each in placed if not each.failed]
     failed = [str(seed) for seed, each in known.seeds.items() if each.failed]
     if not placed:
-        worst = "no open tool places it" if known.netlist else "not placed yet"
+        placer = one.board.part.family.placer
+        worst = "not placed yet" if placer else "no open tool places it"
     else:
         worst = f"failed with seed {', '.join(failed)}" if failed else f"{min(mhz):.1f}"
     return [

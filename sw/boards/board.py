@@ -87,6 +87,11 @@ class Ethernet:
         return ETHERNET_HZ[self.interface]
 
     @property
+    def has_reference(self) -> bool:
+        """Whether it takes its own clock from the FPGA."""
+        return "eth_reference" in self.pads
+
+    @property
     def clocks(self) -> list[str]:
         """Ports of the top at which the PHY gives a clock."""
         return [
@@ -267,7 +272,7 @@ def check_phy(board: Board) -> None:
         raise Misfit(
             f"{board.file}: [ethernet] {phy.interface} is not built for the family {family}"
         )
-    if "eth_reference" in phy.pads and board.node_hz != 2 * phy.hz:
+    if phy.has_reference and board.node_hz != 2 * phy.hz:
         raise Misfit(
             f"{board.file}: [clock] node_hz must be {2 * phy.hz}: the reference of the PHY is half "
             "of it"

@@ -173,7 +173,7 @@ def assigned(design: Design) -> dict[str, str]:
         found |= {name: f"node_{output}" for name, output in RELAY_FLASH.items()}
     elif design.machine.has_flash:
         found |= {name: f"node_{name}" for name in NODE_OUTPUTS if name.startswith("flash")}
-    if design.ethernet and "eth_reference" in design.ethernet.pads:
+    if design.ethernet and design.ethernet.has_reference:
         found |= {"eth_reference": "reference", "eth_reset_n": "!rst"}
     number = {axis.name: n for n, axis in enumerate(design.machine.axes)}
     for one in design.connections:

@@ -9,6 +9,7 @@ import pytest
 from boards import board, build, machine, placements
 from boards.fit import fit
 from figures.synthesis import NotEndedError, SynthesisError
+from tables.boards import placed_row
 
 NETLIST = """{"cells": {"$auto$rtl/axis.sv:%d$%d": {"type": "LUT4", "parameters": {"INIT": "%s"},
 "attributes": {"module_src": "rtl/node.sv:%d.1", "src": "rtl/axis.sv:%d.1"}, "connections": {}}}}"""
@@ -150,3 +151,10 @@ def test_make_boards_says_which_builds_are_not_good(
         placements.main()
     shown = capsys.readouterr().out + str(ended.value.code)
     assert said in shown and bool(ended.value.code) == bool(code)
+
+
+def test_the_page_tells_a_part_that_no_tool_places_from_a_netlist_that_is_not_placed_yet(design):
+    arty = fit(board.named("arty_a7_35t"), machine.named("mill"))
+    for known in (placements.Build(), placements.Build(netlist="a")):
+        assert placed_row(design, known)[4] == "not placed yet"
+        assert placed_row(arty, known)[4] == "no open tool places it"
