@@ -10,9 +10,9 @@ to Verilator's evaluation: in the function it is low.
 
 While the soft core accesses no register, most of the node rests: its registers stay as they are
 until one of its inputs changes. Such an edge evaluates only the other part; and of this part, only
-what is left while the soft core waits, while the axes stand still, and while the motion engine
-waits for the next tick. Which part works is a list of names; a wrong list costs time, but the
-result is the same.
+what is left while the soft core waits, while the motion engine waits for the next tick (both, or
+one of them), and while the axes stand still. Which part works is a list of names; a wrong list
+costs time, but the result is the same.
 
 Everything here works on the text that `verilator --no-decoration` makes; twin/statements.py takes
 it apart.
@@ -49,6 +49,7 @@ PROLOGUE = ("VL_DEBUG_IF", "Vnode__Syms*", "auto& vlSelfRef")
 CORE = "vlSelfRef.node__DOT__g_core__DOT__u_core__DOT__"
 ACCESSES = f"{CORE}mem_valid & {CORE}mem_addr >> 31"  # a register; it may wait for it
 WAITS = f"vlSelfRef.node__DOT__core_waits & {ACCESSES}"
+ENGINE_RESTS = "node__DOT__u_motion__DOT__g_engine__DOT__u_engine__DOT__quiet"
 ALWAYS = "1U"
 SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
 # What may change while the soft core accesses no register: counters in any case; the core itself,
@@ -74,7 +75,6 @@ AXES = (
 )
 SINE = r"u_chain__\w+|u_monitor__\w+|u_adc__\w+|u_recorder__\w+|raw_sin|raw_cos"
 ADC = re.compile(r"__DOT__u_adc__")  # in a node with a sine axis
-FETCHED = re.compile(r"__DOT__u_sequencer__DOT__next_line$")  # it stays while the engine rests
 
 
 def works(*names: str) -> re.Pattern[str]:
@@ -371,22 +371,22 @@ def any_of(conditions: Iterable[str]) -> str:
 @dataclass
 class Edges:
     """The functions of a rising edge. Number 0 evaluates the whole program; each further one leaves
-    out more, a Rest of the program of the one before, and refuses if an input of what it leaves out
-    has changed.
+    out more, a Rest of the program of its parent, and refuses if an input of what it leaves out has
+    changed.
     """
 
     design: Design
     program: Sequence[Statement]
     logic: int  # statements at the beginning that are logic
-    active: Sequence[re.Pattern[str]]  # what changes at each edge from 1 on
+    active: Sequence[tuple[int, re.Pattern[str]]]  # parent of each edge from 1 on, what changes
     programs: list[list[Statement]] = field(init=False)
-    rests: list[Rest] = field(init=False)  # what edge n + 1 leaves out of the program of edge n
+    rests: list[Rest] = field(init=False)  # Rest n is what edge n + 1 leaves out of its parent
     logics: list[int] = field(init=False)  # as `logic`, of each program
 
     def __post_init__(self) -> None:
         self.programs, self.rests, self.logics = [list(self.program)], [], [self.logic]
-        for active in self.active:
-            rest = Rest(self.design, self.programs[-1], self.logics[-1], active)
+        for parent, active in self.active:
+            rest = Rest(self.design, self.programs[parent], self.logics[parent], active)
             self.rests.append(rest)
             self.programs.append([rest.program[n] for n in sorted(rest.works)])
             self.logics.append(sum(n < rest.logic for n in rest.works))
@@ -396,6 +396,14 @@ class Edges:
         # logic that one edge leaves as it was and uses
         self.results = {name for rest in self.rests for name in rest.results}
         self.stored = self.results & set(self.design.locals)
+
+    def left_out(self, number: int) -> list[int]:
+        """The numbers of the Rests that an edge leaves out."""
+        return [*self.left_out(self.active[number - 1][0]), number - 1] if number else []
+
+    def rests_of(self, number: int) -> list[int]:
+        """The numbers of the Rests of which an edge is the parent."""
+        return [n for n, (parent, _) in enumerate(self.active) if parent == number]
 
     def before(self, n: int) -> list[str]:
         """Registers and pins of which Rest n has a copy from before the last edge."""
@@ -430,18 +438,19 @@ class Edges:
         yield f"void forget() {{ {forgets} }}"
 
     def after_logic(self, number: int) -> Plain:
-        """Refuses, or stores the logic inputs of what rests."""
+        """Refuses, or stores the logic inputs of what may rest from the next edge on."""
         computed = {array(name) for name in effect_of(self.programs[number]).changes}
         names: set[str] = set()
         lines = []
-        for n, rest in enumerate(self.rests):
-            inputs = rest.logic_inputs & computed
-            names |= inputs
-            if n < number and inputs:
+        for n in self.left_out(number):
+            if inputs := self.rests[n].logic_inputs & computed:
+                names |= inputs
                 differ = self.changed(sorted(inputs), f"input_{n}_@")
                 lines.append(f"if ({differ}) return false;")
-            elif n >= number:
-                lines += [f"rest.input_{n}_{name} = {self.now(name)};" for name in sorted(inputs)]
+        for n in self.rests_of(number):
+            inputs = self.rests[n].logic_inputs
+            names |= inputs
+            lines += [f"rest.input_{n}_{name} = {self.now(name)};" for name in sorted(inputs)]
         words = {name for s in self.programs[number] for name in s.effect.changes}
         needs = frozenset(name for name in words if array(name) in names)
         return Plain(tuple(lines), Effect(needs, changes=frozenset(["return"])))
@@ -455,8 +464,8 @@ class Edges:
         # inlined where they are called, GCC makes code of them that takes 1.5 times as long
         yield "__attribute__((noinline))"
         yield f"static bool edge_{number}({ROOT}& vlSelfRef, Rest& rest) {{"
-        for n, rest in enumerate(self.rests[:number]):
-            names = rest.inputs & set(self.before(n)) & (computed | self.design.pins)
+        for n in self.left_out(number):
+            names = self.rests[n].inputs & set(self.before(n)) & (computed | self.design.pins)
             differ = self.changed(sorted(names), f"before_{n}_@")
             yield f"if ({differ}) return false;"
         state = {array(name) for name in effect_of(self.program).needs}
@@ -464,31 +473,39 @@ class Edges:
         logic = self.logics[number]
         program = [*program[:logic], self.after_logic(number), *program[logic:]]
         text = text_of(self.design, program, kept, self.stored)
-        for n, rest in enumerate(self.rests):
-            wakes = rest.inputs if n < number else set(rest.changes(False))
-            flag = f"rest.known_{n} = false;" if n < number else f"rest.written_{n} = true;"
-            text = flagged(text, self.arrays & wakes, flag)
+        for n in self.left_out(number):
+            text = flagged(text, self.arrays & self.rests[n].inputs, f"rest.known_{n} = false;")
+        for n in self.rests_of(number):
+            writes = self.arrays & set(self.rests[n].changes(False))
+            text = flagged(text, writes, f"rest.written_{n} = true;")
         yield from (text, "return true;", "}")
 
     def known(self, number: int) -> str:
         """Whether this edge may be evaluated."""
-        return " & ".join(f"rest.known_{n}" for n in range(number))
+        return " & ".join(f"rest.known_{n}" for n in self.left_out(number))
 
-    def observed(self, number: int) -> Iterator[str]:
-        """Statements that evaluate an edge and find out what may rest from the next one on."""
-        yield f"rest.written_{number} = false;"
-        before = self.before(number)
-        yield from (f"rest.before_{number}_{name} = vlSelfRef.{name};" for name in before)
+    def observed(self, n: int) -> Iterator[str]:
+        """Statements that evaluate the parent of Rest n and find out whether it may rest from the
+        next edge on.
+        """
+        number = self.active[n][0]
+        yield f"rest.written_{n} = false;"
+        before = self.before(n)
+        yield from (f"rest.before_{n}_{name} = vlSelfRef.{name};" for name in before)
         yield f"if (edge_{number}(vlSelfRef, rest)) {{"
-        differ = self.changed(before, f"before_{number}_@")
-        yield f"rest.known_{number} = !(rest.written_{number} | {differ});"
+        differ = self.changed(before, f"before_{n}_@")
+        yield f"rest.known_{n} = !(rest.written_{n} | {differ});"
         yield "return;"
         yield "}"
 
-    def chosen(self, number: int, may_rest: str) -> Iterator[str]:
-        """Statements that evaluate an edge, and observe it only where more may rest."""
-        yield from (f"if (!({may_rest})) {{", f"if (edge_{number}(vlSelfRef, rest)) return;")
-        yield from ("} else {", *self.observed(number), "}")
+    def chosen(self, may_rest: Mapping[int, str]) -> Iterator[str]:
+        """Statements that evaluate an edge, and observe it only where one of its Rests may rest:
+        the first whose condition is met.
+        """
+        number = self.active[min(may_rest)][0]
+        for n, condition in may_rest.items():
+            yield from (f"if ({condition}) {{", *self.observed(n), "} else")
+        yield f"if (edge_{number}(vlSelfRef, rest)) return;"
 
 
 def function(design: Design) -> str:
@@ -503,46 +520,41 @@ def function(design: Design) -> str:
     waits, accesses = (NEVER, ALWAYS) if serial else (WAITS, ACCESSES)
     if missing := set(re.findall(r"node__\w+", waits)) - set(design.types):
         raise FormError(f"there is no {', '.join(sorted(missing))}")
-    fetched = [name for name in design.types if FETCHED.search(name)]
-    if any(ADC.search(name) for name in design.types):
-        active = [
-            works(SOFT_CORE, LINE, ENGINE, AXES, SINE),
-            works(ENGINE, AXES, SINE),
-            works(AXES, SINE),
-        ]
-    else:
-        active = [
-            works(SOFT_CORE, LINE, ENGINE, AXES),
-            works(ENGINE, AXES),
-            works(ENGINE),
-            works(),
-        ]
-    if not fetched:
-        active.pop()  # there is no engine
-    edges = Edges(design, program, len(logic), active)
-    last = len(active)
-    lines = ["struct Rest {", *edges.members()]
-    lines += [f"decltype({ROOT}::{name}) last_{name};" for name in fetched]
-    lines.append("};")
-    for number in range(last + 1):
+    engine = ENGINE_RESTS in design.types
+    sine = any(ADC.search(name) for name in design.types)
+    moves = (AXES, SINE) if sine else (AXES,)
+    active = [works(SOFT_CORE, LINE, ENGINE, *moves), works(ENGINE, *moves)]
+    active += [works(*moves)] if sine else [works(ENGINE), works()]
+    if not engine:
+        active.pop()
+    last = apart = len(active)  # the last edge; the Rest that only the edge after it leaves out
+    tree = list(enumerate(active))
+    if engine:  # the soft core works, the engine rests
+        tree.append((1, works(SOFT_CORE, LINE, *moves)))
+    edges = Edges(design, program, len(logic), tree)
+    lines = ["struct Rest {", *edges.members(), "};"]
+    for number in range(len(tree) + 1):
         lines += edges.text(number)
+    rests = f"vlSelfRef.{ENGINE_RESTS}"
     lines.append(f"static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{")
+    if engine:
+        lines += [f"const bool apart = rest.known_{apart};", f"rest.known_{apart} = false;"]
     lines += [f"if ({edges.known(last)} && edge_{last}(vlSelfRef, rest)) return;"]
     for number in reversed(range(1, last)):
         lines.append(f"rest.known_{number} = false;")
         if number == 1:  # an access wakes what rests
             lines += [f"if (({accesses}) & !({waits})) {{", "rest.known_0 = false;"]
             lines += ["edge_0(vlSelfRef, rest);", "return;", "}"]
+            if engine:
+                lines += [f"if (rest.known_0 & apart & !({waits})) {{"]
+                lines += [f"rest.known_{apart} = true;"]
+                lines += [f"if (edge_{apart + 1}(vlSelfRef, rest)) return;"]
+                lines += [f"rest.known_{apart} = false;", "}"]
         lines.append(f"if ({edges.known(number)}) {{")
-        if number == last - 1 and fetched:
-            line = fetched[0]
-            lines += [
-                f"const bool stays = rest.last_{line} == vlSelfRef.{line};",
-                f"rest.last_{line} = vlSelfRef.{line};",
-                *edges.chosen(number, "stays"),
-            ]
-        elif number == 1:
-            lines += edges.chosen(number, waits)
+        if number == 1:
+            lines += edges.chosen({1: waits, apart: rests} if engine else {1: waits})
+        elif number == last - 1 and engine:
+            lines += edges.chosen({number: rests})
         else:
             lines += edges.observed(number)
         lines.append("}")

@@ -84,9 +84,10 @@ def test_results_and_registers_of_the_resting_part():
     assert split.works == {2} and split.results == {"x"} and split.registers == {"a"}
 
 
-def edges(*lines, logic, active, **types):
+def edges(*lines, logic, active, parents=None, **types):
     program = rising_edge.Design(types, set(), set(), {}, frozenset(), frozenset(), parsed(*lines))
-    return rising_edge.Edges(program, program.program, logic, [re.compile(x) for x in active])
+    tree = zip(parents or range(len(active)), map(re.compile, active))
+    return rising_edge.Edges(program, program.program, logic, list(tree))
 
 
 def test_each_edge_leaves_out_more():
@@ -96,6 +97,22 @@ def test_each_edge_leaves_out_more():
         ["now = a;", "b = c;"],
         ["now = a;"],
     ]
+
+
+def test_two_edges_of_one_parent_leave_out_different_parts():
+    lines = ("now = a;", "b = b;", "d = d;", "f = f;")
+    active, parents = ["now|b|d", "now|b", "now|d"], [0, 1, 1]
+    split = edges(*lines, logic=0, active=active, parents=parents)
+    assert [text_of(program) for program in split.programs[1:]] == [
+        ["now = a;", "b = b;", "d = d;"],
+        ["now = a;", "b = b;"],
+        ["now = a;", "d = d;"],
+    ]
+    assert [split.known(number) for number in (2, 3)] == [
+        "rest.known_0 & rest.known_1",
+        "rest.known_0 & rest.known_2",
+    ]
+    assert split.rests_of(1) == [1, 2]
 
 
 def test_an_edge_refuses_if_an_input_of_what_it_leaves_out_has_changed():

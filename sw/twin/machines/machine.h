@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 namespace twin {
@@ -45,11 +46,12 @@ class Machine {
     Machine(double clk_hz, double time_step);
     virtual ~Machine() = default;
 
-    // the node's pins after cycle `now`; true when levels may have changed
+    // the node's pins after cycle `now`; true when levels have changed
     bool clk(uint64_t now, unsigned drive) {
         if (drive == drive_ && now < event_at_) return false;
         advance(now, drive);
-        return true;
+        const unsigned before = std::exchange(seen_, levels());
+        return seen_ != before;
     }
     uint64_t event_at() const { return event_at_; }
     unsigned levels() const { return (pins() & ~forced_) | forced_high_; }  // Sense
@@ -98,6 +100,7 @@ class Machine {
     double clk_hz_;
     uint64_t step_clk_, last_step_ = 0, event_at_ = 0;
     unsigned drive_ = DRIVE_IDLE;
+    unsigned seen_ = ~0u;                                     // levels after the last call
     unsigned forced_ = 0, forced_high_ = 0;                   // levels that faults hold
     std::vector<std::pair<unsigned, unsigned>> wire_faults_;  // pins, of them high
     uint64_t trace_every_ = 0, trace_count_ = 0;

@@ -3,7 +3,6 @@
 // machine and one for the peripherals, and back.
 #pragma once
 #include <cstdint>
-#include <cstring>
 
 #include "machines/machine.h"
 #include "devices/devices.h"
@@ -12,23 +11,36 @@ namespace twin {
 
 class DrivePins {  // those that the node drives, of all axes
  public:
+    static constexpr int MOST_AXES = 8;
+
     template <class Pins>
     bool take(const Pins& pins) {  // true when one has changed
-        const uint32_t now[DRIVE_PINS] = {
-            pins.adc_cs_n, pins.adc_sclk,  pins.bridge_a, pins.bridge_b, pins.drive_enable,
-            pins.step,     pins.direction, pins.dac_cs_n, pins.dac_sclk, pins.dac_sdi};
-        if (!std::memcmp(now, vectors_, sizeof now)) return false;
-        std::memcpy(vectors_, now, sizeof now);
-        return true;
+        const uint64_t first = bytes(pins.adc_cs_n, pins.adc_sclk, pins.bridge_a, pins.bridge_b,
+                                     pins.drive_enable, pins.step, pins.direction, pins.dac_cs_n),
+                       last = bytes(pins.dac_sclk, pins.dac_sdi);
+        const bool changed = (first != first_) | (last != last_);
+        first_ = first;
+        last_ = last;
+        return changed;
     }
     unsigned of(int n) const {  // Drive of axis n
-        unsigned levels = 0;
-        for (unsigned bit = 0; bit < DRIVE_PINS; bit++) levels |= (vectors_[bit] >> n & 1) << bit;
-        return levels;
+        return gathered(first_ >> n) | gathered(last_ >> n) << 8;
     }
 
  private:
-    uint32_t vectors_[DRIVE_PINS] = {};
+    template <class... Vectors>
+    static uint64_t bytes(Vectors... vectors) {  // one of each vector over the axes
+        uint64_t word = 0;
+        unsigned place = 0;
+        ((word |= uint64_t(vectors) << place, place += 8), ...);
+        return word;
+    }
+    // The lowest bits of all bytes: the product puts that of byte n into bit 56 + n.
+    static unsigned gathered(uint64_t word) {
+        return unsigned((word & 0x0101010101010101) * 0x0102040810204080 >> 56);
+    }
+
+    uint64_t first_ = 0, last_ = 0;
 };
 
 class SensePins {

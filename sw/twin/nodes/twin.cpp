@@ -23,6 +23,7 @@ namespace twin {
 
 constexpr int RESET_CLK = 16;
 constexpr uint32_t ALL_AXES = (1u << AXES) - 1;
+static_assert(AXES <= DrivePins::MOST_AXES);
 
 using Firmware = std::vector<uint32_t>;
 
