@@ -11,6 +11,8 @@ from boards.build import fitting
 from boards.fit import Design
 from boards.machine import Axis, Machine
 from boards.placements import Build
+from figures import record
+from figures.comparison import comparisons
 from tables import made_files
 from tables.made_files import ROOT
 
@@ -22,6 +24,16 @@ END = "<!-- End of the made tables. -->\n"
 PLACED = (
     "What was placed so far, by `make boards` ([placements](#placements)); the hash is that of the "
     "placement with the first seed:"
+)
+SIZE = "axis_step_lut"  # the figure that others have a number for
+AXES_OF_A_MILL = 3
+BESIDE = (
+    "What three axes of a mill with scales take elsewhere: an encoder counter and a step generator "
+    "for each axis, measured from public sources (`sw/figures/peers.toml`), without the part that "
+    f"talks to the PC. An axis of Moire is what each further one adds to a node (`{SIZE}` in the "
+    "[README](../README.md#figures)); soft core, bus and motion engine come once for a node, and "
+    "are in the builds of `mill` above. Logic cells of an iCE40 and LUT of an ECP5 are not the same, "
+    "but alike in size:"
 )
 
 
@@ -108,6 +120,17 @@ def placed_row(one: Design, known: Build) -> list[str]:
     ]
 
 
+def beside() -> list[list[str]]:
+    """The size of an axis, of others and of Moire, and of three."""
+    found = [(peer.name, peer.value, peer.source) for peer in comparisons()[SIZE].peers]
+    ours = record.read()[SIZE]
+    what = f"{ours.unit}; counts and steps; filter, profile, servo, homing, interlock"
+    rows = [*sorted(found, key=lambda row: row[1]), ("Moire", ours.value, what)]
+    return [
+        [name, f"{value:.0f}", f"{AXES_OF_A_MILL * value:.0f}", does] for name, value, does in rows
+    ]
+
+
 def make() -> dict[Path, str]:
     boards = [board.named(name) for name in board.names()]
     machines = [machine.named(name) for name in machine.names()]
@@ -134,6 +157,9 @@ def make() -> dict[Path, str]:
             "build, takes of its part, clock in MHz, seeds, worst MHz, best MHz, hash, date",
             [placed_row(one, known.get(one.name, Build())) for one in designs],
         ),
+        "",
+        BESIDE,
+        *table("whose, an axis, three axes, cells and what an axis does", beside()),
         "",
     ]
     return {PAGE: made_files.filled(PAGE, BEGIN, END, lines)}
