@@ -508,6 +508,56 @@ class Edges:
         yield f"if (edge_{number}(vlSelfRef, rest)) return;"
 
 
+def has_engine(design: Design) -> bool:
+    """Whether the node has a motion engine."""
+    return ENGINE_RESTS in design.types
+
+
+def tree_of(design: Design) -> list[tuple[int, re.Pattern[str]]]:
+    """The edges from number 1 on: the parent of each, and what works there. They are a chain, of
+    which each leaves out more, and in a node with a motion engine one more edge, the last, at which
+    the engine rests although the soft core works.
+    """
+    sine = any(ADC.search(name) for name in design.types)
+    moves = (AXES, SINE) if sine else (AXES,)
+    chain = [works(SOFT_CORE, LINE, ENGINE, *moves), works(ENGINE, *moves)]
+    chain += [works(*moves)] if sine else [works(ENGINE), works()]
+    if not has_engine(design):
+        return list(enumerate(chain[:-1]))
+    return [*enumerate(chain), (1, works(SOFT_CORE, LINE, *moves))]
+
+
+def choice(edges: Edges, waits: str, accesses: str) -> Iterator[str]:
+    """Statements that evaluate one of the edges: the last of the chain whose Rests are known, or
+    the whole program. `waits` and `accesses` are conditions of the soft core.
+    """
+    engine = has_engine(edges.design)
+    rests = f"vlSelfRef.{ENGINE_RESTS}"
+    last = apart = len(edges.rests) - engine  # edge; the Rest that the edge after it leaves out
+    if engine:
+        yield from (f"const bool apart = rest.known_{apart};", f"rest.known_{apart} = false;")
+    yield f"if ({edges.known(last)} && edge_{last}(vlSelfRef, rest)) return;"
+    for number in reversed(range(1, last)):
+        yield f"rest.known_{number} = false;"
+        if number == 1:  # an access wakes what rests
+            yield from (f"if (({accesses}) & !({waits})) {{", "rest.known_0 = false;")
+            yield from ("edge_0(vlSelfRef, rest);", "return;", "}")
+        if number == 1 and engine:
+            yield f"if (rest.known_0 & apart & !({waits})) {{"
+            yield f"rest.known_{apart} = true;"
+            yield f"if (edge_{apart + 1}(vlSelfRef, rest)) return;"
+            yield from (f"rest.known_{apart} = false;", "}")
+        yield f"if ({edges.known(number)}) {{"
+        if number == 1:
+            yield from edges.chosen({1: waits, apart: rests} if engine else {1: waits})
+        elif number == last - 1 and engine:
+            yield from edges.chosen({number: rests})
+        else:
+            yield from edges.observed(number)
+        yield "}"
+    yield from ("rest.known_0 = false;", *edges.observed(0))
+
+
 def function(design: Design) -> str:
     """The C++ of `rising_edge`, which evaluates a design whose inputs are set and whose reset is
     low, and of the struct `Rest`, in which it remembers from one edge to the next what rests.
@@ -520,43 +570,10 @@ def function(design: Design) -> str:
     waits, accesses = (NEVER, ALWAYS) if serial else (WAITS, ACCESSES)
     if missing := set(re.findall(r"node__\w+", waits)) - set(design.types):
         raise FormError(f"there is no {', '.join(sorted(missing))}")
-    engine = ENGINE_RESTS in design.types
-    sine = any(ADC.search(name) for name in design.types)
-    moves = (AXES, SINE) if sine else (AXES,)
-    active = [works(SOFT_CORE, LINE, ENGINE, *moves), works(ENGINE, *moves)]
-    active += [works(*moves)] if sine else [works(ENGINE), works()]
-    if not engine:
-        active.pop()
-    last = apart = len(active)  # the last edge; the Rest that only the edge after it leaves out
-    tree = list(enumerate(active))
-    if engine:  # the soft core works, the engine rests
-        tree.append((1, works(SOFT_CORE, LINE, *moves)))
-    edges = Edges(design, program, len(logic), tree)
+    edges = Edges(design, program, len(logic), tree_of(design))
     lines = ["struct Rest {", *edges.members(), "};"]
-    for number in range(len(tree) + 1):
+    for number in range(len(edges.programs)):
         lines += edges.text(number)
-    rests = f"vlSelfRef.{ENGINE_RESTS}"
     lines.append(f"static void rising_edge({ROOT}& vlSelfRef, Rest& rest) {{")
-    if engine:
-        lines += [f"const bool apart = rest.known_{apart};", f"rest.known_{apart} = false;"]
-    lines += [f"if ({edges.known(last)} && edge_{last}(vlSelfRef, rest)) return;"]
-    for number in reversed(range(1, last)):
-        lines.append(f"rest.known_{number} = false;")
-        if number == 1:  # an access wakes what rests
-            lines += [f"if (({accesses}) & !({waits})) {{", "rest.known_0 = false;"]
-            lines += ["edge_0(vlSelfRef, rest);", "return;", "}"]
-            if engine:
-                lines += [f"if (rest.known_0 & apart & !({waits})) {{"]
-                lines += [f"rest.known_{apart} = true;"]
-                lines += [f"if (edge_{apart + 1}(vlSelfRef, rest)) return;"]
-                lines += [f"rest.known_{apart} = false;", "}"]
-        lines.append(f"if ({edges.known(number)}) {{")
-        if number == 1:
-            lines += edges.chosen({1: waits, apart: rests} if engine else {1: waits})
-        elif number == last - 1 and engine:
-            lines += edges.chosen({number: rests})
-        else:
-            lines += edges.observed(number)
-        lines.append("}")
-    lines += ["rest.known_0 = false;", *edges.observed(0), "}"]
+    lines += [*choice(edges, waits, accesses), "}"]
     return "\n".join(lines) + "\n"
