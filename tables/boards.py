@@ -32,8 +32,8 @@ BESIDE = (
     "for each axis, measured from public sources (`sw/figures/peers.toml`), without the part that "
     f"talks to the PC. An axis of Moire is what each further one adds to a node (`{SIZE}` in the "
     "[README](../README.md#figures)); soft core, bus and motion engine come once for a node, and "
-    "are in the builds of `mill` above. Logic cells of an iCE40 and LUT of an ECP5 are not the same, "
-    "but alike in size:"
+    "are in the builds of `mill` above. A logic cell of an iCE40 is a LUT4 with its flip-flop and "
+    "carry:"
 )
 
 
