@@ -227,6 +227,7 @@ def state(design: Design) -> str:
     sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", here]
     sources += [here.with_name(name) for name in ("family.py", "gowin.lock")]
     sources.append(Path(inspect.getfile(yosys)))
+    sources += ethernet.SOURCES if design.ethernet else ()
     found = hashlib.sha256((design.board.part.synthesis + told(design)).encode())
     for path in sources:
         found.update(path.name.encode() + path.read_bytes())

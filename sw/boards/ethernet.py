@@ -18,6 +18,12 @@ from twin.build import ROOT
 
 NAME = "ethernet_core"  # of the module and its file
 MAKER = Path(__file__).with_name("ethernet_core.py")
+SOURCES = (  # of all that the core depends on, but its options
+    MAKER,
+    Path(__file__),
+    ROOT / "sw" / "embed" / "litex.lock",
+    Path(link_tables.__file__),
+)
 
 
 def core(interface: str, family: str, clk_hz: int, delays_ns: tuple[float, float] = (0, 0)) -> Path:
@@ -27,10 +33,8 @@ def core(interface: str, family: str, clk_hz: int, delays_ns: tuple[float, float
     """
     if not has_ethernet():
         raise Misfit("the Ethernet core is made by LiteEth, which is not set up: make litex")
-    sources = [MAKER, Path(__file__), ROOT / "sw" / "embed" / "litex.lock"]
-    sources.append(Path(link_tables.__file__))
     words = [interface, family, str(clk_hz), *map(str, delays_ns)]
-    name = build.digest(sources, *words)
+    name = build.digest(list(SOURCES), *words)
 
     def make(folder: Path) -> None:
         file = folder / f"{NAME}.v"

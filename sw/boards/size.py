@@ -24,7 +24,7 @@ FEATURES = {
 STEPPER = 730  # in an axis that has another drive
 PERIPHERALS = 3033  # all six (docs/peripherals.md); one alone was not measured
 LINK = 1296  # the real-time link
-ETHERNET = {"mii": 3427, "rgmii": 4837}  # core of LiteEth by the interface, as synthesised
+ETHERNET = {"mii": 3377, "rgmii": 4921}  # core of LiteEth by the interface, as synthesised
 SET_POINTS, SET_POINTS_AXIS = 3827, 353  # of the first axis that has them, of each further one
 # Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of ten nodes)
 MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core

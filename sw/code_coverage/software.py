@@ -28,7 +28,7 @@ TESTS = [ROOT / "tb" / name for name in ("firmware", "host")]
 DEPENDS = [ROOT / "tb" / "fakes", FIRMWARE, HOST, ROOT / "sw" / "twin" / "compiled"]
 COMPLETE = "complete"  # file in it: the tests passed with the sources of this digest
 NOTES = "gcov"  # folder in it: notes and counts of gcc
-COUNTS = "host"  # how the names of the files of coverage.py begin
+COUNTS = "counts"  # how the names of the files of coverage.py begin
 LONGEST_S = 3 * 3600
 
 

@@ -164,6 +164,18 @@ def test_gcov_counts_the_lines_and_ways_of_the_firmware(tmp_path, monkeypatch):
     assert [n for _, n in sorted(found["sign.c"].arms.items())] == [0, 1]
 
 
+def test_the_counts_of_all_folders_of_tests_are_combined(tmp_path, monkeypatch):
+    folders = [tmp_path / "tests" / tests.name for tests in software.TESTS]
+    for folder in folders:
+        folder.mkdir(parents=True)
+        test = "from moire import errors\n\n\ndef test_errors():\n    assert errors\n"
+        (folder / f"test_{folder.name}.py").write_text(test)
+    monkeypatch.setattr(software, "FOLDER", tmp_path / "counts")
+    monkeypatch.setattr(software, "TESTS", folders)
+    assert software.gather(len(folders)) == []
+    assert "sw/host/moire/errors.py" in software.host()
+
+
 def test_coverage_of_the_host_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(software, "FOLDER", tmp_path)
     file = "sw/host/moire/errors.py"
