@@ -9,6 +9,7 @@ exist, so properties do not count; neither do benches and the soft cores of othe
 
 import ast
 import hashlib
+import itertools
 import json
 import os
 import re
@@ -117,13 +118,18 @@ def run(test: Path) -> str:
 
 def gather(tests: Iterable[Path], jobs: int, until: float = float("inf")) -> list[str]:
     """Run the files of tests whose counts are missing, and begin none after the time `until` of
-    time.monotonic(). Returns what went wrong.
+    time.monotonic(). Prints each that has ended, and returns what went wrong.
     """
+    missing, ended = [test for test in tests if not gathered(test)], itertools.count(1)
 
     def in_time(test: Path) -> str:
-        return run(test) if time.monotonic() < until else ""
+        if time.monotonic() >= until:
+            return ""
+        fault = run(test)
+        words = "FAILED" if fault else "passed"
+        print(f"{next(ended)} of {len(missing)}: {test.stem} {words}", flush=True)
+        return fault
 
-    missing = [test for test in tests if not gathered(test)]
     with ThreadPoolExecutor(jobs) as pool:
         return [fault for fault in pool.map(in_time, missing) if fault]
 

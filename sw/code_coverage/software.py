@@ -56,6 +56,7 @@ def run(tests: Path) -> str:
     stamp = folder / COMPLETE
     if stamp.exists() and stamp.read_text() == now:
         return ""
+    print(f"tests of {tests.name}: they take minutes", flush=True)
     shutil.rmtree(folder, ignore_errors=True)
     (folder / NOTES).mkdir(parents=True)
     done = coverage(
