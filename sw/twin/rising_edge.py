@@ -537,24 +537,22 @@ def choice(edges: Edges, waits: str, accesses: str) -> Iterator[str]:
     if engine:
         yield from (f"const bool apart = rest.known_{apart};", f"rest.known_{apart} = false;")
     yield f"if ({edges.known(last)} && edge_{last}(vlSelfRef, rest)) return;"
-    for number in reversed(range(1, last)):
-        yield f"rest.known_{number} = false;"
-        if number == 1:  # an access wakes what rests
-            yield from (f"if (({accesses}) & !({waits})) {{", "rest.known_0 = false;")
-            yield from ("edge_0(vlSelfRef, rest);", "return;", "}")
-        if number == 1 and engine:
-            yield f"if (rest.known_0 & apart & !({waits})) {{"
-            yield f"rest.known_{apart} = true;"
-            yield f"if (edge_{apart + 1}(vlSelfRef, rest)) return;"
-            yield from (f"rest.known_{apart} = false;", "}")
-        yield f"if ({edges.known(number)}) {{"
-        if number == 1:
-            yield from edges.chosen({1: waits, apart: rests} if engine else {1: waits})
-        elif number == last - 1 and engine:
-            yield from edges.chosen({number: rests})
-        else:
-            yield from edges.observed(number)
+    for number in reversed(range(2, last)):
+        yield from (f"rest.known_{number} = false;", f"if ({edges.known(number)}) {{")
+        quiet = number == last - 1 and engine
+        yield from edges.chosen({number: rests}) if quiet else edges.observed(number)
         yield "}"
+    yield "rest.known_1 = false;"
+    # an access wakes what rests
+    yield from (f"if (({accesses}) & !({waits})) {{", "rest.known_0 = false;")
+    yield from ("edge_0(vlSelfRef, rest);", "return;", "}")
+    if engine:
+        yield from (f"if (rest.known_0 & apart & !({waits})) {{", f"rest.known_{apart} = true;")
+        yield f"if (edge_{apart + 1}(vlSelfRef, rest)) return;"
+        yield from (f"rest.known_{apart} = false;", "}")
+    yield f"if ({edges.known(1)}) {{"
+    yield from edges.chosen({1: waits, apart: rests} if engine else {1: waits})
+    yield "}"
     yield from ("rest.known_0 = false;", *edges.observed(0))
 
 
