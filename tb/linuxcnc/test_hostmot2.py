@@ -5,11 +5,12 @@ LinuxCNC runs with its own drivers and its own pid on the machine of the mill.
 
 import struct
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from linuxcnc_config import ball_bar, headless, hostmot2
-from linuxcnc_config.ball_bar import GAINS, PID, circle
+from linuxcnc_config.ball_bar import GAINS, NOT_ANSWERED, PID, STARTS, circle
 from linuxcnc_config.hostmot2 import (
     CARD_MAC,
     CLOCK_HZ,
@@ -164,6 +165,49 @@ def test_linuxcnc_runs_a_circle_with_its_own_drivers(needs_linuxcnc):
     found = circle(PID, short=True)
     print(ball_bar.line_of(PID, found))
     assert found.deviation < 8e-3 and found.radial_deviation < 8e-3, "mm"
+
+
+class PaperMachine:
+    """In place of a Hostmot2Machine: nothing moves."""
+
+    cable = SimpleNamespace(within=())
+
+    def __init__(self, *_):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def configuration(self):
+        return None
+
+    def hal(self):
+        return ""
+
+    def true_path(self):
+        return "the path"
+
+
+@pytest.mark.parametrize("misses, starts", [(0, 1), (1, 2), (STARTS - 1, STARTS), (9, STARTS)])
+def test_linuxcnc_starts_again_where_its_driver_had_no_answer_in_time(monkeypatch, misses, starts):
+    runs = []
+
+    def run(*_):
+        runs.append(None)
+        late = len(runs) <= misses
+        return headless.Run(late, NOT_ANSWERED if late else "", [] if late else [{"done": True}])
+
+    monkeypatch.setattr(ball_bar, "Hostmot2Machine", PaperMachine)
+    monkeypatch.setattr(ball_bar, "run", run)
+    if misses < STARTS:
+        assert ball_bar.by_pid(GAINS, "", 1) == "the path"
+    else:
+        with pytest.raises(MoireError, match=f"no answer of the card in {STARTS} starts"):
+            ball_bar.by_pid(GAINS, "", 1)
+    assert len(runs) == starts
 
 
 def test_gains_that_do_not_fit_the_machine_are_reported(needs_linuxcnc):
