@@ -165,7 +165,8 @@ def fmax_of(clocks: dict[str, dict[str, float]], target_mhz: float) -> float:
         elif achieved < needed:
             clean = CLOCK_NET.sub("", name)
             raise SynthesisError(
-                f"the clock {clean} reaches {achieved:.1f} MHz and needs {needed:g}"
+                f"the clock {clean} reaches {achieved:.1f} MHz and needs {needed:g}: another SEED "
+                "of the placement may reach it"
             )
     return min(found or [clock["achieved"] for clock in clocks.values()], default=0.0)
 

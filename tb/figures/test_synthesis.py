@@ -24,7 +24,6 @@ def test_a_clock_with_its_own_constraint_that_reaches_it_does_not_count():
 
 
 def test_a_clock_with_its_own_constraint_must_reach_it():
-    with pytest.raises(
-        SynthesisError, match="^the clock eth_rx_clk reaches 106.7 MHz and needs 125$"
-    ):
+    words = "^the clock eth_rx_clk reaches 106.7 MHz and needs 125: another SEED"
+    with pytest.raises(SynthesisError, match=words):
         fmax_of({"clk": NODE, PHY: {"achieved": 106.68, "constraint": 125.0}}, 50)
