@@ -16,6 +16,7 @@ from tb.control.set_point_axis import MARGIN
 from tb.control.set_point_piece import piece_of, played
 from tb.control.set_point_player import EXTENSION, SetPointPlayer
 from tb.control.set_point_queue import address_of
+from tb.ports import Ports
 
 ONE = 1 << 16  # a period in a position
 TICK_CYCLES = 600  # for each two axes
@@ -53,7 +54,7 @@ class Player:
     """The design with the model beside it in every cycle, and with an engine."""
 
     def __init__(self, dut):
-        self.dut, self.axes = dut, int(dut.AXES.value)
+        self.dut, self.ports, self.axes = dut, Ports(dut), int(dut.AXES.value)
         self.model = SetPointPlayer(self.axes, int(dut.MASK.value))
         self.engines = [Engine(at=1000 * n) for n in range(self.axes)]
         self.tick_cycles = TICK_CYCLES * max(1, self.axes // 2)
@@ -80,7 +81,7 @@ class Player:
 
     async def clk(self, rst=0, stops=0, take=1, **stored):
         """Advance one cycle. With `take`, the engine takes an offered word when it is idle."""
-        dut, model = self.dut, self.model
+        ports, model = self.ports, self.model
         stored = dict(stores=0, at=0, value=0, low=0) | stored
         tick = int(self.cycle % self.tick_cycles == self.tick_cycles - 1)
         self.cycle += 1
@@ -92,28 +93,24 @@ class Player:
         self.wait = max(0, self.wait - 1)
         offered = model.offer()
         taken = int(bool(offered) and settled and take)
-        dut.rst.value, dut.tick.value, dut.stops.value = rst, tick, stops
-        dut.enabled.value, dut.settled.value, dut.piece_taken.value = self.enabled, settled, taken
-        for name, level in zip(
-            ("stores", "stored_at", "stored_value", "wdata_low"), stored.values()
-        ):
-            getattr(dut, name).value = level
-        dut.result_valid.value = int(bool(shown))
+        inputs = {"rst": rst, "tick": tick, "stops": stops, "enabled": self.enabled}
+        inputs |= {"settled": settled, "piece_taken": taken, "result_valid": int(bool(shown))}
+        inputs |= zip(("stores", "stored_at", "stored_value", "wdata_low"), stored.values())
         states, target = {}, None
         if shown:
             axis, kind, value = shown
-            dut.result_axis.value, dut.result_kind.value, dut.result.value = axis, kind, value
+            inputs |= {"result_axis": axis, "result_kind": kind, "result": value}
             if kind == 0:
                 states[axis] = value >> MOVING & 1, value >> BRAKING & 1, value >> QUEUED & 31
             elif kind == 1:
                 target = axis, value
+        ports.drive(inputs)
         await Timer(1, "ns")
-        assert int(dut.piece_valid.value) == int(offered is not None)
+        assert ports["piece_valid"] == int(offered is not None)
         if offered:
-            names = ("piece_axis", "piece_part")
-            found = [*(int(getattr(dut, name).value) for name in names)]
-            assert (*found, dut.piece_word.value.to_signed()) == offered
-        await FallingEdge(dut.clk)
+            found = ports["piece_axis"], ports["piece_part"], ports.signed("piece_word")
+            assert found == offered
+        await FallingEdge(self.dut.clk)
         model.clk(
             rst=rst,
             tick=tick,
@@ -125,13 +122,14 @@ class Player:
             settled=settled,
             **stored,
         )
-        assert int(dut.tick_count.value) == model.tick_count
-        assert (int(dut.start.value), int(dut.stop.value)) == (model.start, model.stop)
+        assert ports["tick_count"] == model.tick_count
+        assert (ports["start"], ports["stop"]) == (model.start, model.stop)
+        of_axes = ports["states"], ports["counts"]
         for n, a in enumerate(model.axes):
             if model.built(n):
                 state = a.state(len(model.queue.commits))
-                assert int(dut.states.value) >> 32 * n & 0xFFFF_FFFF == state
-                assert int(dut.counts.value) >> 32 * n & 0xFFFF_FFFF == a.counts
+                got = tuple(packed >> 32 * n & 0xFFFF_FFFF for packed in of_axes)
+                assert got == (state, a.counts)
         if rst:
             return
         if taken:

@@ -9,12 +9,12 @@ import random
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
-from cocotb.types import LogicArray
 
 from tb.bench import needs, run, start
 from tb.interpolate.harmonic_correction import POINTS
 from tb.interpolate.interpolation_chain import InterpolationChain, Outputs, OwnChain
 from tb.interpolate.signal_correction import Settings
+from tb.ports import Ports
 
 # strobes of an axis, by bit
 OUTLIER, LIMIT, OFFSET, GAIN, QUADRATURE_ERROR, LOAD, POINT, SWAP = range(8)
@@ -31,7 +31,8 @@ class Bench:
     """Design and model, with the sample and the count that each axis holds."""
 
     def __init__(self, dut):
-        self.dut, self.axes, self.w = dut, int(dut.AXES.value), int(dut.W.value)
+        self.dut, self.ports = dut, Ports(dut)
+        self.axes, self.w = int(dut.AXES.value), int(dut.W.value)
         self.harmonics = int(dut.HAS_HARMONICS.value)
         self.apart = int(dut.SAMPLE_CYCLES.value)  # of the samples of an axis
         self.model = InterpolationChain(self.axes, self.w, self.harmonics, self.apart)
@@ -73,21 +74,20 @@ class Bench:
         """New samples by axis, and a setting, which is on the bus in the cycle before its strobe;
         returns what design and model give. A cycle with a setting has another one before it.
         """
-        dut, new = self.dut, new or {}
+        new = new or {}
         strobes, setting = self.word(words or {})
         if words:
-            dut.setting.value = setting
+            self.ports.drive({"setting": setting})
             await self.cycle(enable=enable, learn=learn)
         enable = self.everyone if enable is None else enable
         for n, sample in new.items():
             self.held[n] = sample
-        dut.valid.value, dut.rst.value = sum(1 << n for n in new), rst
-        dut.sin.value = packed([sin for sin, _ in self.held], self.w)
-        dut.cos.value = packed([cos for _, cos in self.held], self.w)
-        dut.count.value = packed(self.counts, 32)
-        dut.setting_written.value, dut.harmonic_enable.value = strobes << 8 * axis, enable
-        dut.learn.value = learn
-        await FallingEdge(dut.clk)
+        inputs = {"valid": sum(1 << n for n in new), "rst": rst, "learn": learn}
+        inputs |= {"sin": packed([sin for sin, _ in self.held], self.w)}
+        inputs |= {"cos": packed([cos for _, cos in self.held], self.w)}
+        inputs |= {"count": packed(self.counts, 32), "setting_written": strobes << 8 * axis}
+        self.ports.drive(inputs | {"harmonic_enable": enable})
+        await FallingEdge(self.dut.clk)
         samples = [(n in new, *self.held[n]) for n in range(self.axes)]
         want = self.model.step(samples, self.counts, axis, words, enable, learn, rst)
         got = self.outputs()
@@ -95,30 +95,31 @@ class Bench:
         return got
 
     def outputs(self):
-        dut = self.dut
+        ports = self.ports
 
         def strobed(strobes, *values, flag=None):
             """(axis, values, flag) if one of the strobes is high."""
-            axes = [n for n in range(self.axes) if int(strobes.value) >> n & 1]
-            assert len(axes) <= 1 and (flag is None or int(flag.value) in (0, int(strobes.value)))
+            high = ports[strobes]
+            axes = [n for n in range(self.axes) if high >> n & 1]
+            flagged = flag and ports[flag]
+            assert len(axes) <= 1 and flagged in (None, 0, high)
             if not axes:
                 return None
-            flags = () if flag is None else (int(int(flag.value) != 0),)
-            return (*axes, *(convert(value.value) for value, convert in values), *flags)
+            flags = () if flag is None else (int(flagged != 0),)
+            return (*axes, *(value() for value in values), *flags)
 
-        signed, plain = LogicArray.to_signed, LogicArray.to_unsigned
         return Outputs(
             strobed(
-                dut.sampled,
-                (dut.sampled_sin, signed),
-                (dut.sampled_cos, signed),
-                flag=dut.rejected,
+                "sampled",
+                lambda: ports.signed("sampled_sin"),
+                lambda: ports.signed("sampled_cos"),
+                flag="rejected",
             ),
-            strobed(dut.phase_valid, (dut.plain_phase, plain)),
-            strobed(dut.done, (dut.step, signed), (dut.phase, plain), flag=dut.overspeed),
-            int(dut.disagreement.value),
-            int(dut.overrun.value),
-            int(dut.lost.value),
+            strobed("phase_valid", lambda: ports["plain_phase"]),
+            strobed("done", lambda: ports.signed("step"), lambda: ports["phase"], flag="overspeed"),
+            ports["disagreement"],
+            ports["overrun"],
+            ports["lost"],
         )
 
     async def table(self, table, axis):

@@ -17,6 +17,7 @@ from moire.bus.link_spi import reply_bytes, reply_in
 from moire.made.registers import FIELDS
 from tb.bench import needs, run, start
 from tb.link.link_pll import FULL
+from tb.ports import Ports
 from tb.serial.uart_rx import UartRx, character, line
 
 SESSION = 0x00BEEF
@@ -36,15 +37,16 @@ class Port:
 
     def __init__(self, dut):
         self.dut, self.receiver, self.heard = dut, UartRx(0, 4), bytearray()
+        self.ports = Ports(dut)
         self.registers, self.answers, self.now = {}, [0, 0], 0
         self.drive_on, self.datagrams = 0, [bytearray()]
         self.driven, self.drops = 0, 0  # driver enable now, and how often it fell
 
     async def clk(self, rx=1, **inputs):
-        dut = self.dut
+        ports = self.ports
         self.now += 1
-        driven = int(dut.link_driver_enable.value)
-        assert driven or int(dut.link_tx.value), "the line is idle without the driver"
+        driven = ports["link_driver_enable"]
+        assert driven or ports["link_tx"], "the line is idle without the driver"
         self.drops += self.driven and not driven
         self.driven = driven
         inputs = (
@@ -57,25 +59,24 @@ class Port:
             }
             | inputs
         )
-        for name, level in inputs.items():
-            getattr(dut, name).value = level
+        ports.drive(inputs)
         await ReadOnly()
         answer = self.answers[-1]
-        if int(dut.link_select.value):
-            address = int(dut.link_address.value)
-            if int(dut.link_write.value):
-                self.registers[address] = int(dut.link_wdata.value)
+        if ports["link_select"]:
+            address = ports["link_address"]
+            if ports["link_write"]:
+                self.registers[address] = ports["link_wdata"]
             answer = self.registers.get(address, address + 1)
         self.answers.append(answer)
-        valid, byte, *_ = self.receiver.step(int(dut.link_tx.value), 16 * BIT)
+        valid, byte, *_ = self.receiver.step(ports["link_tx"], 16 * BIT)
         if valid:
             self.heard.append(byte)
-        if int(dut.udp_tx_valid.value):
-            self.datagrams[-1].append(int(dut.udp_tx_data.value))
-            if int(dut.udp_tx_last.value):
-                assert int(dut.udp_tx_length.value) == len(self.datagrams[-1])
+        if ports["udp_tx_valid"]:
+            self.datagrams[-1].append(ports["udp_tx_data"])
+            if ports["udp_tx_last"]:
+                assert ports["udp_tx_length"] == len(self.datagrams[-1])
                 self.datagrams.append(bytearray())
-        await FallingEdge(dut.clk)
+        await FallingEdge(self.dut.clk)
 
     async def datagram(self, content, sender=HOST, error=0):
         """A datagram, and the one that answers it: (receiver, content); None if there is none."""

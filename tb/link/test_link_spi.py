@@ -11,6 +11,7 @@ from cocotb.triggers import FallingEdge, ReadOnly
 from moire.made import link_tables as layout
 from tb.bench import run, start
 from tb.link.link_spi import NAMES, LinkSpi
+from tb.ports import Ports
 
 IDLE = dict(cs_n=1, sclk=0, mosi=0, accepted=0, reply_valid=0, reply_data=0, reply_last=0)
 REPLY = bytes([layout.KIND_REPLY, 0x00, 0xFF, 0x5A])
@@ -22,6 +23,7 @@ class Follower:
 
     def __init__(self, dut):
         self.dut, self.model, self.cycles = dut, LinkSpi(), 0
+        self.ports = Ports(dut)
         self.settings = dict(writes=0, cs_n=1, sclk=0, mosi=0)
         self.accepts, self.playing, self.reply = True, PLAYING, REPLY
         self.begin()
@@ -42,14 +44,10 @@ class Follower:
             "reply_data": self.left[0] if offers else 0x55,
             "reply_last": int(offers and len(self.left) == 1),
         }
-        for name, level in inputs.items():
-            getattr(self.dut, name).value = level
+        self.ports.drive(inputs)
         await ReadOnly()
         want = dict(zip(NAMES, self.model.outputs(**inputs), strict=True))
-        for name, level in want.items():
-            if level is not None:
-                got = int(getattr(self.dut, name).value)
-                assert got == level, f"cycle {self.cycles}: {name} is {got:#x}, not {level:#x}"
+        self.ports.check(want, self.cycles)
         self.model.step(**inputs)
         self.answer(want, offers)
         self.cycles += 1

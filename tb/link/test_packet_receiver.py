@@ -12,6 +12,7 @@ from moire.bus.link import Link, sealed
 from moire.made import link_tables as layout
 from tb.bench import run, start
 from tb.link.packet_receiver import NAMES, PacketReceiver
+from tb.ports import Ports
 
 SESSION = 0xABCDEF
 NAMED = ("accepted", "bank", "refused", "put", "put_at", "word")
@@ -22,6 +23,7 @@ class Receiver:
 
     def __init__(self, dut):
         self.dut, self.model, self.cycles = dut, PacketReceiver(), 0
+        self.ports = Ports(dut)
         self.settings = {"enable": 1, "session": SESSION, "writes": 2, "time_window": 0}
         self.now = self.busy = self.put = 0
 
@@ -29,15 +31,11 @@ class Receiver:
         """One cycle; returns accepted."""
         inputs = {"valid": valid, "data": data, "ends": ends, "broken": broken, "rst": rst}
         inputs |= self.settings | {"now": self.now, "busy": self.busy, "foreign": foreign}
-        for name, level in inputs.items():
-            getattr(self.dut, name).value = level
+        self.ports.drive(inputs)
         await ReadOnly()
         want = self.model.outputs(**inputs)
-        for name, level in zip(NAMED, want, strict=True):
-            if level is not None:
-                got = int(getattr(self.dut, name).value)
-                assert got == level, f"cycle {self.cycles}: {name} is {got:#x}, not {level:#x}"
-        self.put = int(self.dut.put.value)
+        self.ports.check(dict(zip(NAMED, want, strict=True)), self.cycles)
+        self.put = self.ports["put"]
         self.model.step(**inputs)
         self.cycles += 1
         await RisingEdge(self.dut.clk)

@@ -15,6 +15,7 @@ from tb.peripheral.eeprom_24aa128 import Eeprom
 from tb.peripheral.i2c_master import NO_BUS, NOT_ACKNOWLEDGED, OK, READ, START, STOP, WRITE
 from tb.peripheral.ps2_lines import Host, Keyboard
 from tb.peripheral.test_i2c_master import edges
+from tb.ports import Ports
 
 CLK_HZ = 1_000_000
 MS = CLK_HZ // 1000
@@ -60,6 +61,7 @@ class Peripherals:
     """The block with everything around it, one cycle at a time; registers by their names."""
 
     def __init__(self, dut):
+        self.ports = Ports(dut)
         self.dut, self.eeprom, self.keyboard, self.machine = (
             dut,
             Eeprom(write_clk=5 * MS),
@@ -107,8 +109,8 @@ class Peripherals:
             self.step_devices()
 
     def step_devices(self):
-        d, k, m, e = self.dut, self.keyboard, self.machine, self.eeprom
-        pulls = int(d.i2c_scl_low.value), int(d.i2c_sda_low.value)
+        ports, k, m, e = self.ports, self.keyboard, self.machine, self.eeprom
+        pulls = ports["i2c_scl_low"], ports["i2c_sda_low"]
         lines = [
             int(not (own or device or stuck))
             for own, device, stuck in zip(pulls, (e.scl_low > 0, e.sda_low), self.stuck)
@@ -116,15 +118,15 @@ class Peripherals:
         e.step(*lines)
         self.wires.append(lines[0] | lines[1] << 1)
         k.step(
-            1 - (int(d.keyboard_clock_low.value) | k.clock_low),
-            1 - (int(d.keyboard_data_low.value) | k.data_low),
+            1 - (ports["keyboard_clock_low"] | k.clock_low),
+            1 - (ports["keyboard_data_low"] | k.data_low),
         )
         m.step(
-            1 - (int(d.edm_clock_low.value) | m.clock_low),
-            1 - (int(d.edm_data_low.value) | m.data_low),
+            1 - (ports["edm_clock_low"] | m.clock_low),
+            1 - (ports["edm_data_low"] | m.data_low),
         )
-        self.peer.receive(int(d.peer_tx.value))
-        self.read_display(int(d.display_cs_n.value), int(d.display_sclk.value))
+        self.peer.receive(ports["peer_tx"])
+        self.read_display(ports["display_cs_n"], ports["display_sclk"])
         inputs = dict(
             i2c_scl=lines[0],
             i2c_sda=lines[1],
@@ -136,9 +138,7 @@ class Peripherals:
             sensor_rx=self.sensor.level(),
             edm_status=self.lamps,
         )
-        for name, level in inputs.items():
-            if int(getattr(d, name).value) != level:
-                getattr(d, name).value = level
+        ports.drive(inputs)
 
     def read_display(self, cs_n, sclk):
         """Read the pins as a MAX7219 does: a bit at each rise of sclk, the word at the rise of
@@ -146,7 +146,7 @@ class Peripherals:
         """
         before, self.display = self.display, (cs_n, sclk)
         if sclk and not before[1]:
-            self.bits.append(int(self.dut.display_data.value))
+            self.bits.append(self.ports["display_data"])
         if cs_n and not before[0]:
             self.shown.append(self.bits[-16:])
             self.bits = []

@@ -16,6 +16,7 @@ from moire.made import bus_tables
 from moire.made import registers as host
 from tables import registers as tables
 from tb.bench import ROOT, rtl_only, run, start
+from tb.ports import Ports
 from tb.registers.register_block import WORD, RegisterBlock
 from tb.simulator import BENCHES
 
@@ -29,7 +30,7 @@ class Bus:
     """One clk at a time, the model beside the block in every one of them."""
 
     def __init__(self, dut):
-        self.dut = dut
+        self.dut, self.ports = dut, Ports(dut)
         self.block = next(b for b in tables.read() if f"{b.name}_bench" == dut._name)
         without = [
             parameter
@@ -79,30 +80,19 @@ class Bus:
             await self.clk(word=word, wdata=wdata)
         self.shown, self.stored = (word, wdata), select and write and word in self.wide
         now = self.inputs | inputs
-        for name, level in [
-            *self.pins(now).items(),
-            ("select", select),
-            ("write", write),
-            ("word", word),
-            ("wdata", wdata),
-            ("rst", rst),
-        ]:
-            port = getattr(self.dut, name)
-            if int(port.value) != level:
-                port.value = level
+        bus = {"select": select, "write": write, "word": word, "wdata": wdata, "rst": rst}
+        self.ports.drive(self.pins(now) | bus)
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
         want = self.model.step(select, write, word, wdata, now, rst)
-        got = {name: int(getattr(self.dut, name).value) for name in want}
+        got = {name: self.ports[name] for name in want}
         wrong = [
             f"{n} is {got[n]:#x}, the model has {want[n]:#x}" for n in want if got[n] != want[n]
         ]
         access = "write" if write else "read" if select else "idle"
         assert not wrong, f"word {word:#x} {access}: {'; '.join(wrong)}"
         if rst:
-            self.dut.rst.value = self.dut.select.value = 0
-            for name, level in self.pins(self.inputs).items():
-                getattr(self.dut, name).value = level
+            self.ports.drive(self.pins(self.inputs) | {"rst": 0, "select": 0})
             await self.ready()
         return got
 

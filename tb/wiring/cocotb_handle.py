@@ -20,6 +20,15 @@ class Pin:
     def value(self, level):
         self._bench.set(**{self._name: int(level)})
 
+    @property
+    def _handle(self):
+        """Behind it in cocotb is the simulator, which tb.ports asks."""
+        return self
+
+    def get_signal_val_binstr(self):
+        """The level as the text of an unsigned number, without its leading zeros."""
+        return f"{int(self.value):b}"
+
 
 class Parameter:
     """A parameter of a design as cocotb shows it."""
