@@ -18,11 +18,12 @@ from tables.engine_microcode import (
     assembled,
     worst,
 )
-from tb.bench import needs, run, start
+from tb.bench import needs, rtl_only, run, start
 from tb.control.motion_engine import LAST, Axis, moved, wrap
 
 PERIOD = 1 << 40  # of velocity, acceleration and jerk
 LSB = 1 << 24  # of target, in the same unit
+LONGEST = (1 << 24) - 1  # cycles, of the time since the last tick
 STROBES = dict(
     shift="shift",
     set="set_target_to_position",
@@ -115,7 +116,7 @@ class Engine:
             getattr(dut, STROBES[name]).value = 0
         if tick:
             dut.tick.value = 0
-            self.period, self.since = self.since + 1, 0
+            self.period, self.since = min(self.since + 1, LONGEST), 0
             self.seen = (
                 list(self.position),
                 list(self.steps),
@@ -286,6 +287,21 @@ async def the_targets_of_a_short_profile_are_as_worked_out_by_hand(dut):
     await engine.play(0, (PERIOD, 0, 0, 2), (PERIOD, -PERIOD // 2, 0, 2, 1))
     assert engine.models[0].target == 0
     assert [target / 65536 for target in await engine.finish(0)] == [1.5, 2.5, 3.25, 3.5]
+
+
+@cocotb.test()
+async def the_time_since_the_last_tick_stops_at_its_end(dut):
+    rtl_only("it sets the time inside, since it is too long to be waited for")
+    engine = await Engine(dut).reset()
+    await engine.tick()
+    engine.since = LONGEST - 8
+    dut.elapsed.value = engine.since + 1
+    await FallingEdge(dut.clk)
+    engine.since += 1
+    await engine.tick(stepped={0: (5 << 16, 0)})
+    assert engine.period == LONGEST
+    await engine.tick(stepped={0: (5 << 16, 0)})
+    assert engine.period < LONGEST
 
 
 @cocotb.test()

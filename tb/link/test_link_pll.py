@@ -10,8 +10,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from tb.bench import run, seed, start
-from tb.link.link_pll import FULL, GAIN, NAMES, PATIENCE, LinkPll
+from tb.bench import rtl_only, run, seed, start
+from tb.link.link_pll import FULL, GAIN, INTEGRAL, NAMES, PATIENCE, RANGE, LinkPll
 from tb.ports import Ports
 
 PERIOD, LEAD = 2048, 400
@@ -92,6 +92,25 @@ async def an_arrival_shifts_the_next_one_by_the_256th_part_of_its_error(dut):
         await bench.arrive(following + parts * GAIN)
         await bench.arrive(following + PERIOD)
         assert bench.model.error == -parts
+
+
+@cocotb.test()
+async def the_correction_of_the_period_stops_at_both_ends_of_its_range(dut):
+    rtl_only("it sets the correction inside, since it takes too long to get there")
+    for end, late in ((RANGE * INTEGRAL - 1, 9), (-RANGE * INTEGRAL, -9)):
+        bench = await begin(dut)
+        await bench.lock(3)
+        dut.trim.value = bench.model.trim = end
+        while bench.model.phase > 0:
+            await bench.clk()
+        await bench.idle(late - bench.model.phase)
+        await bench.clk(arrived=1)
+        assert bench.model.error == late
+        await bench.idle(PERIOD)
+        assert bench.model.trim == end, "it would have left its range"
+        for _ in range(2):  # the errors show the correction of the design
+            await bench.clk(arrived=1)
+            await bench.idle(PERIOD)
 
 
 @cocotb.test()

@@ -166,6 +166,15 @@ async def the_clock_is_pulled_for_100_us_at_least(dut):
 
 
 @cocotb.test()
+async def a_hold_for_longer_than_the_time_can_count_goes_on(dut):
+    side = await Side(dut).begin()
+    assert (await side.clk(hold=1, n=round(25_000 * US)))[6] == 1
+    assert (await side.clk(n=4))[8] == 0
+    await side.type(frame(0x1C))
+    assert side.bytes == [(0x1C, 0)]
+
+
+@cocotb.test()
 async def a_command_by_hand(dut):
     side = await Side(dut).begin()
     while not (await side.clk(command=0xED))[0]:

@@ -91,10 +91,11 @@ async def after_hold_samples_the_next_is_taken(dut):
 
 @cocotb.test()
 async def hold_255_is_the_filter_of_s0_and_never_returns(dut):
-    model = await begin(dut)
-    out = await stream(dut, model, [(0, 0)] + [(100, 0)] * 600, 10, 255)
-    assert out == [(0, 0, 0)] + [(0, 0, 1)] * 600
-    assert await stream(dut, model, [(9, 0), (100, 0)], 10, 255) == [(9, 0, 0), (9, 0, 1)]
+    for near, far in (((9, 0), (100, 0)), ((0, 9), (0, 100))):
+        model = await begin(dut)
+        out = await stream(dut, model, [(0, 0)] + [far] * 600, 10, 255)
+        assert out == [(0, 0, 0)] + [(0, 0, 1)] * 600
+        assert await stream(dut, model, [near, far], 10, 255) == [(*near, 0), (*near, 1)]
 
 
 @cocotb.test()
