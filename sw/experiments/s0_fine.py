@@ -13,7 +13,6 @@ of the sine signal, because the correction removes a quadrature error of 2 degre
 sine. This distance is the same at every homing.
 """
 
-import argparse
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -25,13 +24,12 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments import start_page
+from experiments import command, start_page
 from experiments.s0_metrology import Metrology
-from experiments.s0_stage import LEFT_OUT, TRACE_HZ, Stage, random_moves, table
+from experiments.s0_stage import LEFT_OUT, MOVES, TRACE_HZ, Stage, random_moves, table
 from moire.analysis import report
 from moire.client.records import CalibrationState
-from moire.errors import MoireError
-from twin import WITH_SEGMENTS, BuildError
+from twin import WITH_SEGMENTS
 from twin.machines.machine import Trace
 from twin.nodes.twin import drives
 
@@ -123,7 +121,10 @@ def hand_over_picture(stage: FineStage, name: str, target_nm: float) -> bytes:
 
 
 def run(
-    seed: int = 1, count: int = 24, folder: Path = start_page.FOLDER, console: Console | None = None
+    seed: int = 1,
+    count: int = MOVES,
+    folder: Path = start_page.FOLDER,
+    console: Console | None = None,
 ) -> tuple[list[report.Move], Path]:
     """Runs the whole experiment and returns the moves and the path of the report."""
     console = console or Console()
@@ -194,34 +195,14 @@ def run(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the experiment from the command line and returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.s0_fine",
-        description="S0 with its fine stage: it homes, calibrates, moves and writes a report.",
+    parser = command.parser_of(
+        "s0_fine",
+        "S0 with its fine stage: it homes, calibrates, moves and writes a report.",
+        "the targets",
     )
-    parser.add_argument(
-        "--seed", type=int, default=1, help="seed of the machine and of the targets (default 1)"
-    )
-    parser.add_argument(
-        "--moves", type=int, default=24, help="number of moves, 2 to 10000 (default 24)"
-    )
-    parser.add_argument(
-        "--report",
-        type=Path,
-        default=start_page.FOLDER,
-        help="directory of the page (default build/report)",
-    )
-    options = parser.parse_args(arguments)
-    if not 2 <= options.moves <= 10000:
-        parser.error(f"--moves takes 2 to 10000, not {options.moves}")
-    try:
-        run(options.seed, options.moves, options.report)
-    except (MoireError, BuildError) as error:
-        print(f"s0_fine: {error}", file=sys.stderr)
-        return int(getattr(error, "exit_code", 1))
-    except KeyboardInterrupt:
-        print("s0_fine: interrupted", file=sys.stderr)
-        return 130
-    return 0
+    command.add_number(parser, "--moves", "moves", MOVES, least=2)
+    asked = parser.parse_args(arguments)
+    return command.exit_code("s0_fine", lambda: run(asked.seed, asked.moves, asked.report))
 
 
 if __name__ == "__main__":

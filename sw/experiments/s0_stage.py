@@ -10,7 +10,6 @@ metrologist would, and writes build/report/s0_stage.html. The paper reached 0.8 
 alone.
 """
 
-import argparse
 import random
 import sys
 import time
@@ -23,14 +22,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from experiments import start_page
+from experiments import command, start_page
 from experiments.s0_metrology import Metrology, targets
 from moire.analysis import report
 from moire.client.axis import Axis
 from moire.client.bus import Bus
 from moire.client.records import CalibrationState, Identity, Status
 from moire.errors import MoireError
-from twin import BuildError, Twin, TwinTransport
+from twin import Twin, TwinTransport
 from twin.machines.machine import MachineHandle, Trace
 from twin.nodes.twin import CLK_HZ, NODE
 
@@ -413,40 +412,22 @@ def table(moves: Sequence[report.Move]) -> Table:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the experiment from the command line and returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.s0_stage",
-        description="The X-Y stage of S0 in the twin: it homes, moves and writes a report.",
+    parser = command.parser_of(
+        "s0_stage",
+        "The X-Y stage of S0 in the twin: it homes, moves and writes a report.",
+        "the targets",
     )
-    parser.add_argument(
-        "--seed", type=int, default=1, help="seed of the machine and of the targets (default 1)"
-    )
-    parser.add_argument(
-        "--moves", type=int, default=MOVES, help=f"number of moves, 1 to 10000 (default {MOVES})"
-    )
-    parser.add_argument(
-        "--report",
-        type=Path,
-        default=start_page.FOLDER,
-        help="directory of the page (default build/report)",
-    )
+    command.add_number(parser, "--moves", "moves", MOVES)
     parser.add_argument(
         "--thorough",
         action="store_true",
         help="adds ten seconds of standstill, a calibration, and a test of the X axis by ISO 230-2 "
         "over its travel: some minutes",
     )
-    options = parser.parse_args(arguments)
-    if not 1 <= options.moves <= 10000:
-        parser.error(f"--moves takes 1 to 10000, not {options.moves}")
-    try:
-        run(options.seed, options.moves, options.report, options.thorough)
-    except (MoireError, BuildError) as error:
-        print(f"s0_stage: {error}", file=sys.stderr)
-        return int(getattr(error, "exit_code", 1))
-    except KeyboardInterrupt:
-        print("s0_stage: interrupted", file=sys.stderr)
-        return 130
-    return 0
+    asked = parser.parse_args(arguments)
+    return command.exit_code(
+        "s0_stage", lambda: run(asked.seed, asked.moves, asked.report, asked.thorough)
+    )
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ results are build/report/s1_ring.html and the readings, build/report/s1_readings
 reduced the error from 134.59 to 12.62 arcsec.
 """
 
-import argparse
 import subprocess
 import sys
 from collections.abc import Iterable, Sequence
@@ -24,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from rich.console import Console
 from rich.table import Table
 
-from experiments import report_page, start_page
+from experiments import command, report_page, start_page
 from moire.analysis import report
 from moire.analysis.harmonic_fit import Harmonics, Readings, fit, read_readings
 from moire.analysis.metrology import harmonics
@@ -32,7 +31,6 @@ from moire.analysis.metrology_pictures import harmonic_bars
 from moire.bus.transport import BITS, Transport
 from moire.client.relay import Relay, Settings, Status, make_set, terms_of
 from moire.errors import BadFile, MoireError
-from twin import BuildError
 from twin.build import ROOT, simulation
 from twin.machines.ring import ARC_SECOND, RotaryRing
 
@@ -52,6 +50,7 @@ TEN_DEGREES = np.arange(0.0, 361.0, 10.0)
 DWELL_S = 15.0  # from one reading to the next
 LEFT_OUT = "orders above 16, jitter of the read head"
 EARLY = 400  # at power-up the ring is at rest this many counts before its index
+PLACES = 180  # of the second pass
 HIGH_ORDERS = slice(PAPER_ORDERS + 1, None)
 
 Array = NDArray[np.float64]
@@ -418,7 +417,7 @@ def page(
 
 def run(
     seed: int = 1,
-    places: int = 180,
+    places: int = PLACES,
     folder: Path = start_page.FOLDER,
     console: Console | None = None,
 ) -> tuple[list[Method], Path]:
@@ -466,37 +465,14 @@ def run(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the experiment from the command line and returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.s1_ring",
-        description="The ring of S1: it is read, fitted, corrected and measured again.",
+    parser = command.parser_of(
+        "s1_ring",
+        "The ring of S1: it is read, fitted, corrected and measured again.",
+        "its readings",
     )
-    parser.add_argument(
-        "--seed", type=int, default=1, help="seed of the ring and its readings (default 1)"
-    )
-    parser.add_argument(
-        "--places",
-        type=int,
-        default=180,
-        help="number of angles of the second pass, 8 to 10000 (default 180)",
-    )
-    parser.add_argument(
-        "--report",
-        type=Path,
-        default=start_page.FOLDER,
-        help="directory of the page (default build/report)",
-    )
-    options = parser.parse_args(arguments)
-    if not 8 <= options.places <= 10000:
-        parser.error(f"--places takes 8 to 10000, not {options.places}")
-    try:
-        run(options.seed, options.places, options.report)
-    except (MoireError, BuildError) as error:
-        print(f"s1_ring: {error}", file=sys.stderr)
-        return int(getattr(error, "exit_code", 1))
-    except KeyboardInterrupt:
-        print("s1_ring: interrupted", file=sys.stderr)
-        return 130
-    return 0
+    command.add_number(parser, "--places", "angles of the second pass", PLACES, least=8)
+    asked = parser.parse_args(arguments)
+    return command.exit_code("s1_ring", lambda: run(asked.seed, asked.places, asked.report))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ s2_count_errors measures 500 mm/s, which is 1000 times the top speed of the pape
 counts per second.
 """
 
-import argparse
 import random
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -26,15 +25,14 @@ from typing import Self
 from rich.console import Console
 from rich.table import Table
 
-from experiments import start_page
+from experiments import command, start_page
 from experiments.report_page import picture, text_of
 from moire.analysis import report
 from moire.client.axis import Axis as ClientAxis
 from moire.client.bus import Bus
 from moire.client.records import Status
-from moire.errors import MoireError
 from moire.units import Value
-from twin import BuildError, Twin, TwinTransport
+from twin import Twin, TwinTransport
 from twin.nodes.twin import Axis, Node, drives
 
 CLK_HZ = 4_800_000  # the motion engine needs 1171 cycles a tick for three axes
@@ -444,21 +442,11 @@ def run(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the experiment from the command line and returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.s2_stage",
-        description="S2 in the twin: it homes, moves, counts and writes a report.",
+    parser = command.parser_of(
+        "s2_stage", "S2 in the twin: it homes, moves, counts and writes a report."
     )
-    parser.add_argument("--seed", type=int, default=1, help="seed of the machine (default 1)")
-    options = parser.parse_args(arguments)
-    try:
-        run(options.seed)
-    except (MoireError, BuildError) as error:
-        print(f"s2_stage: {error}", file=sys.stderr)
-        return int(getattr(error, "exit_code", 1))
-    except KeyboardInterrupt:
-        print("s2_stage: interrupted", file=sys.stderr)
-        return 130
-    return 0
+    asked = parser.parse_args(arguments)
+    return command.exit_code("s2_stage", lambda: run(asked.seed, asked.report))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ the mark, always in the positive direction. The result is build/report/s3_zero.h
 paper was within +-2 um.
 """
 
-import argparse
 import math
 import random
 import sys
@@ -23,15 +22,15 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from experiments import start_page
+from experiments import command, start_page
 from experiments.report_page import picture, text_of
 from moire.analysis import report
 from moire.client.bus import Bus
 from moire.client.index_survey import PASSES
 from moire.client.records import IndexSurvey, Status
-from moire.errors import MoireError, NotSurveyed
+from moire.errors import NotSurveyed
 from moire.units import Value
-from twin import BuildError, Twin, TwinTransport
+from twin import Twin, TwinTransport
 from twin.machines.machine import Trace
 from twin.nodes.twin import Axis, Node, drives
 from twin.parameters import tables as parameters
@@ -393,31 +392,12 @@ def run(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the experiment from the command line and returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.s3_zero",
-        description="S3 in the twin: it searches the zero and writes a report.",
+    parser = command.parser_of(
+        "s3_zero", "S3 in the twin: it searches the zero and writes a report.", "the positions"
     )
-    parser.add_argument(
-        "--seed", type=int, default=1, help="seed of the machine and of the positions (default 1)"
-    )
-    parser.add_argument(
-        "--searches",
-        type=int,
-        default=SEARCHES,
-        help=f"number of searches, 1 to 10000 (default {SEARCHES})",
-    )
-    options = parser.parse_args(arguments)
-    if not 1 <= options.searches <= 10000:
-        parser.error(f"--searches takes 1 to 10000, not {options.searches}")
-    try:
-        run(options.seed, options.searches)
-    except (MoireError, BuildError) as error:
-        print(f"s3_zero: {error}", file=sys.stderr)
-        return int(getattr(error, "exit_code", 1))
-    except KeyboardInterrupt:
-        print("s3_zero: interrupted", file=sys.stderr)
-        return 130
-    return 0
+    command.add_number(parser, "--searches", "searches", SEARCHES)
+    asked = parser.parse_args(arguments)
+    return command.exit_code("s3_zero", lambda: run(asked.seed, asked.searches, asked.report))
 
 
 if __name__ == "__main__":

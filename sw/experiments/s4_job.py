@@ -15,7 +15,6 @@ power failure, after which the operator answers.
 The times are shortened: a cut takes 0.3 s, and the table turns 10 degrees per second.
 """
 
-import argparse
 import html
 import math
 import random
@@ -30,18 +29,17 @@ from rich.console import Console
 from rich.status import Status
 from rich.table import Table as Rows
 
-from experiments import start_page
+from experiments import command, start_page
 from experiments.report_page import picture, text_of
 from moire.analysis import report
 from moire.client.bus import Bus
-from moire.client.indexing_table import TURN, IndexingTable
+from moire.client.indexing_table import MOST_STATIONS, TURN, IndexingTable
 from moire.client.job import Job, JobState, equal_parts
 from moire.client.node import Node as ClientNode
 from moire.client.nonvolatile import SavedSettings
 from moire.client.settings import Settings
-from moire.errors import MoireError
 from moire.units import Value
-from twin import Axis, BuildError, Devices, Node, Twin, TwinTransport, build
+from twin import Axis, Devices, Node, Twin, TwinTransport, build
 from twin.nodes.twin import drives
 
 MAIN, SUB = 0, 1  # numbers of the nodes in the twin
@@ -92,6 +90,7 @@ NEAR = 60  # arcsec: a cut farther away from every station belongs to none
 TABLE: dict[str, Value] = {"turn_settle": "40ms"}
 TOLERANCE = 2.0  # arcsec, as in the paper
 MODES = ("frames", "legacy")
+STATIONS = 36  # of the job, equal parts of the turn
 LEFT_OUT = "bending of the work piece, wear, temperature; errors of the sensor above 1 arcsec"
 
 PAD = """7 8 9 START PAUSE RESUME STOP
@@ -512,7 +511,7 @@ def shown_by(console: Console, status: Status) -> Callable[[str], None]:
 
 
 def run(
-    count: int = 36,
+    count: int = STATIONS,
     mode: str = MODES[0],
     seed: int = 1,
     trouble: bool = False,
@@ -603,37 +602,29 @@ def run(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the experiment from the command line and returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.s4_job",
-        description="S4 in the twin: it runs a whole job and checks its cuts.",
+    parser = command.parser_of(
+        "s4_job", "S4 in the twin: it runs a whole job and checks its cuts.", "the trouble"
     )
-    parser.add_argument(
-        "--stations", type=int, default=36, help="number of equal parts of the turn (default 36)"
+    command.add_number(
+        parser, "--stations", "equal parts of the turn", STATIONS, most=MOST_STATIONS
     )
     parser.add_argument(
         "--peers",
         choices=MODES,
         default=MODES[0],
-        help="protocol between the nodes (default frames)",
+        help=f"protocol between the nodes (default {MODES[0]})",
     )
     parser.add_argument(
         "--trouble",
         action="store_true",
         help="adds damaged sensor frames, garbage, an operator who types, and a power failure",
     )
-    parser.add_argument(
-        "--seed", type=int, default=1, help="seed of the machine and of the trouble (default 1)"
+    asked = parser.parse_args(arguments)
+    return command.exit_code(
+        "s4_job",
+        lambda: run(asked.stations, asked.peers, asked.seed, asked.trouble, asked.report),
+        failed=lambda made: made[0].failed,
     )
-    options = parser.parse_args(arguments)
-    try:
-        outcome, _ = run(options.stations, options.peers, options.seed, options.trouble)
-    except (MoireError, BuildError) as error:
-        print(f"s4_job: {error}", file=sys.stderr)
-        return int(getattr(error, "exit_code", 1))
-    except KeyboardInterrupt:
-        print("s4_job: interrupted", file=sys.stderr)
-        return 130
-    return int(outcome.failed)
 
 
 if __name__ == "__main__":
