@@ -26,12 +26,17 @@ def evenly(count, share=1.0):
 
 
 @pytest.mark.parametrize("share", [1.0, 0.8])
-@pytest.mark.parametrize("quadrature_error_deg", [-20, 0, 6])
+@pytest.mark.parametrize("quadrature_error_deg", [-65, -20, 0, 6, 65])
 def test_offsets_amplitudes_and_quadrature_error_are_found(share, quadrature_error_deg):
     known = Ellipse(5.0, -7.5, 101.0, 88.0, quadrature_error_deg, 0.0)
     found = fit(*samples(known, evenly(40, share)))
     assert vars(found) == pytest.approx(vars(known), abs=1e-6)
     assert found.amplitude == pytest.approx(94.5)
+
+
+def test_an_ellipse_is_found_whose_offsets_are_far_larger_than_its_amplitudes():
+    known = Ellipse(30_000.0, -20_000.0, 101.0, 88.0, 6.0, 0.0)
+    assert vars(fit(*samples(known, evenly(40)))) == pytest.approx(vars(known), abs=1e-6)
 
 
 def test_an_ellipse_is_found_whose_extremes_no_sample_meets():
@@ -55,6 +60,19 @@ def test_the_curve_lies_on_the_ellipse_and_is_closed():
     assert len(cos) == len(sin) == 25
     assert (cos[0], sin[0]) == pytest.approx((cos[-1], sin[-1]))
     assert vars(fit(cos, sin)) == pytest.approx(vars(KNOWN), abs=1e-6)
+    assert len(KNOWN.points()[0]) == 96
+
+
+def all_but(first_deg, last_deg):
+    """Turns around the circle with a gap between these two."""
+    return [math.radians(last_deg + n * (360 + first_deg - last_deg) / 59) for n in range(60)]
+
+
+def test_the_samples_may_leave_a_quarter_of_the_circle_empty():
+    circle = Ellipse(0, 0, 100, 100, 0, 0)
+    assert fit(*samples(circle, all_but(0.25, 90))).amplitude == pytest.approx(100)
+    with pytest.raises(NoEllipse, match="leave 9[01] degrees of the circle empty"):
+        fit(*samples(circle, all_but(-0.25, 90.25)))
 
 
 @pytest.mark.parametrize(

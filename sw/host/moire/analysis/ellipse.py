@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy
 
 from moire.errors import MoireError
+from moire.made.bus_tables import PARAMETERS
 
 FEWEST = 12  # samples of an ellipse
 WIDEST_GAP_DEG = 90  # of the phase, in which there may be no sample
-OFF = 65535  # a limit of this value is switched off
+OFF = PARAMETERS["signal_clip_level"].max  # with this value there is no limit
 
 
 class NoEllipse(MoireError):
