@@ -144,8 +144,11 @@ def test_a_packet_that_is_too_long_is_dropped_and_counted_and_not_stored():
 def test_the_server_says_at_which_address_nobody_is():
     [message] = cobs.PacketReader().feed(cobs.nobody(7, 5))
     assert message[0] == cobs.FROM_SERVER and cobs.nobody_at(message) == 5
+    assert cobs.body_of(message) == bytes([7, 1, 5])
     assert cobs.speed_in(message) is None
     [request] = cobs.PacketReader().feed(cobs.speed_request(1))
     for other in (cobs.speed_reply(request, 1.0), cobs.packet(0x55, b"\7\1\5")):
         assert cobs.nobody_at(*cobs.PacketReader().feed(other)) is None
     assert cobs.nobody_at(message[:-1]) is None
+    [unknown] = cobs.PacketReader().feed(cobs.packet(cobs.FROM_SERVER, bytes([7, 2, 5])))
+    assert cobs.nobody_at(unknown) is None
