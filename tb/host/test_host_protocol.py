@@ -9,6 +9,7 @@ import pytest
 
 from moire.bus.protocol import (
     FROM_NODE,
+    MOST_AXES,
     ODD_ADDRESSES,
     TO_NODE,
     Exchange,
@@ -91,6 +92,11 @@ def test_values_that_do_not_fit_are_refused_before_sending():
         request_body("move", 1, axis=0, target=0, speed=1)
 
 
+def test_a_mask_of_axes_has_a_bit_for_each_axis():
+    masks = [dict(OPERATIONS[name].request)["axes"] for name in ("start", "start_at_sync")]
+    assert masks == ["u8", "u8"] and MOST_AXES == 8
+
+
 def test_every_body_fits_the_longest():
     for operation in OPERATIONS.values():
         assert (
@@ -120,6 +126,7 @@ def test_a_refusal_has_a_cause_and_nothing_else():
 def test_the_usual_times_and_tries():
     exchange = Exchange(1, ENABLE)
     assert exchange.tries == 5 and exchange.timing.quiet == 0.02
+    assert exchange.timing.character == 11 / 115200  # 11 bits at the usual speed
     assert exchange.timeout_s == pytest.approx(0.1 + 11 / 115200)
 
 
@@ -229,6 +236,12 @@ def test_the_timeout_grows_with_the_number_of_expected_words():
     assert exchange.expected == 7 and exchange.timeout_s == pytest.approx(0.107)
     exchange.feed([7, 3, 0])
     assert exchange.expected == 4
+
+
+def test_the_shortest_reply_that_is_waited_for_has_one_byte():
+    exchange = Exchange(1, ENABLE)
+    exchange.feed([0x61, 0x51, 1])
+    assert exchange.state == State.AWAIT_BODY and exchange.expected == 5 and not exchange.events
 
 
 # ------------------------------------------------------------------ with a node at the other end

@@ -240,7 +240,7 @@ class Exchange:
     def begin(self) -> None:
         """Begins an attempt."""
         self.attempts += 1
-        self.state, self.received, self.noise = State.AWAIT_READY, [], 0
+        self.state, self.received = State.AWAIT_READY, []
         self.outgoing = write_words(self.address)
         if not self.handshake:
             self.send_request()
