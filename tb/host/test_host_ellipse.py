@@ -98,10 +98,24 @@ def test_samples_on_a_hyperbola_or_on_few_points_are_no_ellipse():
         fit([100, 0, -100, 0] * 4, [0, 100, 0, -100] * 4)
 
 
-def test_a_gap_reaches_across_the_angle_of_180_degrees():
-    turns = [math.radians(one) for one in (100, 160, -160, -60, 20)]
+def test_a_long_hyperbola_is_no_ellipse():
+    """(x + y)^2 - 0.04 (x - y)^2 = 1, which is near to two parallel lines."""
+    sums = [
+        (side * math.cosh(n / 10), math.sinh(n / 10) / 0.2)
+        for n in range(-20, 21)
+        for side in (1, -1)
+    ]
+    with pytest.raises(NoEllipse, match="on no ellipse"):
+        fit([(u + v) / 2 for u, v in sums], [(u - v) / 2 for u, v in sums])
+
+
+@pytest.mark.parametrize(
+    "turns_deg, gap_deg", [((100, 160, -160, -60, 20), 100), ((-100, -20, 50, 100), 160)]
+)
+def test_a_gap_may_reach_across_the_angle_of_180_degrees(turns_deg, gap_deg):
+    turns = [math.radians(one) for one in turns_deg]
     xs, ys = [math.cos(one) for one in turns], [math.sin(one) for one in turns]
-    assert widest_gap_deg(xs, ys) == pytest.approx(100)
+    assert widest_gap_deg(xs, ys) == pytest.approx(gap_deg)
 
 
 @pytest.mark.parametrize(

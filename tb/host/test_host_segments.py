@@ -4,12 +4,20 @@ back, and the commands.
 """
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 
 from moire.client.bus import Bus
-from moire.client.segments import NotInForce, Segments, SegmentTable, read_table, text_of
+from moire.client.segments import (
+    PATIENCE_S,
+    NotInForce,
+    Segments,
+    SegmentTable,
+    read_table,
+    text_of,
+)
 from moire.errors import BadFile, OutOfRange
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
@@ -54,6 +62,7 @@ def file(tmp_path):
         ["position / mm, error / nm", *GOOD],
         ["x (um), deviation [um]", "0,0", "1000,0.1", "2000,-0.05", "3000,0.02"],
         ["0, 0", "1mm, 0.1um", "2000um, -50nm", "3 mm, 20 nm"],
+        ["position (of 100 um each) / mm, error of um / nm", *GOOD],
         ["position / um, error / pm", "0mm, 0", "1mm, 100000", "2mm, -50000", "3000, 20nm"],
     ],
 )
@@ -65,6 +74,7 @@ def test_a_table_is_read_with_its_units(file, lines):
     "lines, message",
     [
         (["0, 0", "1, 100", "3, 20", "4, 30"], "line 3: from 1mm to 3mm a border is missing"),
+        (["0, 0", "1, 100", "3, 20"], "line 3: from 1mm to 3mm a border is missing"),
         (
             ["0, 0", "1, 100", "1, 100", "2, 3"],
             "line 3: the position 1mm is there twice, also in line 2",
@@ -73,6 +83,12 @@ def test_a_table_is_read_with_its_units(file, lines):
             ["0, 0", "2, 100", "1, 100", "3, 3"],
             "line 3: the position 1mm comes after 2mm in line 2",
         ),
+        (
+            ["0, 0", "1, 0", "2, 0", "3, 0", "2.5, 0"],
+            "line 5: the position 2.5mm comes after 3mm in line 4",
+        ),
+        (["0, 0", "1, 0", "2.0021, 0", "3, 0"], "line 3: 2.0021mm is no border of equal segments"),
+        (["0, 0", "1, 9um", "2, 19.001um"], "line 3: an error of 19.001um after 9um is absurd"),
         (
             ["0, 0", "1, 100", "2.2, 100", "3.2, 3"],
             "line 3: 2.2mm is no border of equal segments of 1mm",
@@ -90,6 +106,11 @@ def test_an_error_in_the_file_is_reported_with_its_line(file, lines, message):
     with pytest.raises(BadFile) as reported:
         read_table(file(*lines))
     assert message in str(reported.value)
+
+
+def test_borders_and_errors_may_be_off_to_their_limits(file):
+    read = read_table(file("0, 0", "1, 10um", "2.002, 20um", "3, 30um"))
+    assert read.errors == (0, 10_000, 20_000, 30_000) and read.length == 10**6
 
 
 def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
@@ -137,6 +158,40 @@ def test_a_table_is_written_completely_and_comes_into_force():
         -100,
     )
     assert Segments(axis_of(node)).read() == table
+
+
+def test_the_largest_table_and_the_largest_points_are_written():
+    node = node_with_table()
+    segments = Segments(axis_of(node))
+    errors = tuple(Fraction(n % 7) for n in range(256))
+    assert segments.load(SegmentTable(Fraction(0), Fraction(10**6), errors)).loaded == 256
+    segments.check_points([0, (1 << 23) - 1, 1 - (1 << 23)])
+    for point in (1 << 23, -(1 << 23)):
+        with pytest.raises(OutOfRange, match="table is above 102.4um: 128 periods are the most"):
+            segments.check_points([0, point])
+
+
+def test_of_more_points_than_there_are_segments_the_first_ones_are_read():
+    segments = Segments(axis_of(node_with_table()))
+    segments.load(SegmentTable(Fraction(0), Fraction(10**6), (0, 100, 200, 300)), "off")
+    segments.axis.set_parameter("segment_count", 2)
+    assert segments.read().errors == (0, 100, 200)
+
+
+def test_a_use_is_waited_for_while_the_axis_is_busy_but_not_for_ever():
+    segments = Segments(axis_of(node_with_table()))
+    segments.load(SegmentTable(Fraction(0), Fraction(10**6), (0, 100)), "off")
+    usual, clock = segments.status, segments.axis.transport.now
+    for busy, least_s, most_s in ((0, 0, 0.05), (3, 0, 0.45), (10**6, PATIENCE_S, 0.6)):
+        asked = []
+
+        def status(busy=busy, asked=asked):
+            asked.append(clock())
+            return replace(usual(), reason="busy") if len(asked) <= busy else usual()
+
+        segments.status, begun = status, clock()
+        assert segments.use("linear").reason == ("busy" if busy > 3 else "ok")
+        assert least_s <= clock() - begun <= most_s and len(asked) >= min(busy, 3) + 1
 
 
 def test_positions_count_from_the_zero_whatever_the_home_offset():

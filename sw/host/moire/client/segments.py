@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from statistics import median_low
 
 from moire import units
 from moire.client.axis import Axis
@@ -155,7 +156,7 @@ def check_borders(
     path: Path, positions: list[Fraction], errors: list[Fraction], lines: list[int]
 ) -> None:
     """Raises BadFile unless the borders are at equal distances and the errors are plausible."""
-    usual = sorted(b - a for a, b in zip(positions, positions[1:]))[(len(positions) - 1) // 2]
+    usual = median_low(b - a for a, b in zip(positions, positions[1:]))
     for n in range(1, len(positions)):
         where = f"{path}, line {lines[n]}"
         if positions[n] - positions[n - 1] > MISSING * usual:
