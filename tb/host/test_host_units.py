@@ -123,6 +123,8 @@ def test_numbers_are_written_as_people_read_them():
     assert units.decimal(Fraction(1, 3)) == "0.333333333333333"
     assert units.rounded(Fraction(2, 3), 3) == "0.667"
     assert units.rounded(1999999, 3) == "2000000"
+    assert units.rounded(104, 2) == "100"
+    assert units.rounded(95, 2) == "95"
     assert units.rounded(Fraction(2, 300), 3) == "0.00667"
     assert units.rounded(Fraction(912345, 10**9), 3) == "0.000912"
 
