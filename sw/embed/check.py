@@ -75,7 +75,8 @@ def failed(step: str, command: Sequence[object]) -> list[str]:
         text=True,
     )
     said = (done.stdout + done.stderr).strip().splitlines()
-    return [f"{step}: {' | '.join(said[-3:]) or 'failed'}"] if done.returncode else []
+    reasons = [line for line in said if line.startswith("%")][:3] or said[-3:]  # of Verilator
+    return [f"{step}: {' | '.join(reasons) or 'failed'}"] if done.returncode else []
 
 
 def lint(name: str, files: Sequence[Path]) -> list[str]:
@@ -114,12 +115,12 @@ def simulated(test: str) -> list[str]:
     return []
 
 
-def wrong_example(example: Example, simulate: bool = True) -> list[str]:
-    """What fails of an example."""
+def wrong_example(example: Example, build: bool = True, simulate: bool = True) -> list[str]:
+    """What fails of an example: its lint, and if asked for its synthesis and its simulation."""
     files = sources(example)
     return [
         *lint(example.name, files),
-        *synthesised(example.name, files[-1], example.family),
+        *(synthesised(example.name, files[-1], example.family) if build else []),
         *(simulated(example.name) if simulate else []),
     ]
 

@@ -10,12 +10,12 @@ from figures.common import Figure, Quick, console
 def embed_failed(
     cores: Sequence[str] = (), examples: Sequence[str] = (), whole: bool = True, seed: int = 1
 ) -> float:
-    """Failures of lint, build and simulation: of these cores and examples, or of all if none is
-    named; `whole` simulates the examples and builds the LiteX SoC as well.
+    """Failures of lint, build and simulation of these cores, or of all, and of the examples, of
+    which these are built, or all; `whole` simulates them and builds the LiteX SoC as well.
     """
     found = fusesoc.wrong(fusesoc.named(cores), seed)
-    for name in examples or check.EXAMPLES:
-        found += check.wrong_example(check.EXAMPLES[name], whole)
+    for name, example in check.EXAMPLES.items():
+        found += check.wrong_example(example, not examples or name in examples, whole)
     if whole:
         found += check.wrong_soc()
     for line in found:
@@ -33,7 +33,7 @@ FIGURES = {
         "0",
         Quick(
             {"cores": ("synchroniser",), "examples": ("position_counter",), "whole": False},
-            "one core, lint and build of one example",
+            "one core, lint of the examples, build of one",
         ),
         0,
     ),

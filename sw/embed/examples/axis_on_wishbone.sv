@@ -99,6 +99,19 @@ module axis_on_wishbone #(
     wire        [47:0] target;
     wire [15:0] phase, fine_command;
     wire [12:0] faults;
+    // registers of streamed set-points, which only the count of ticks is of use for here
+    wire [31:0] tick_count, stream_state, stream_counts;
+    // registers of a recorder of ticks, which there is not
+    wire [2:0] excitation_axis, scope_axis, scope_last, scope_mode;
+    wire        [12:0] excitation_period;
+    wire        [14:0] excitation_limit;
+    wire signed [15:0] excitation_value;
+    wire        [11:0] excitation_value_at;
+    wire excitation_value_written, scope_word_read, scope_level_written;
+    wire [3:0] scope_trigger;
+    wire [31:0] scope_channels_0, scope_channels_4;
+    wire [15:0] scope_samples_length, scope_samples_every, scope_place_earlier, scope_place_delay;
+    wire signed [31:0] scope_level;
 
     wishbone_port u_port (
         .clk,
@@ -170,23 +183,47 @@ module axis_on_wishbone #(
     node_registers u_node_registers (
         .clk,
         .rst,
-        .select       (node_select),
+        .select               (node_select),
         .write,
-        .word         (address[7:2]),
+        .word                 (address[7:2]),
         .wdata,
-        .rdata        (node_rdata),
-        .clk_hz       (32'(CLK_HZ)),
-        .build_axes   (4'd1),
-        .build_address(4'd0),
-        .build_memory (8'd0),
-        .time_stamp   (now),
+        .rdata                (node_rdata),
+        .clk_hz               (32'(CLK_HZ)),
+        .build_axes           (4'd1),
+        .build_address        (4'd0),
+        .build_memory         (8'd0),
+        .build_scope          (9'd0),
+        .time_stamp           (now),
         .tick_period,
         .sample_period,
         .heartbeat_kick,
         .start_axes,
         .start_axes_written,
         .wait_time,
-        .wait_time_written
+        .wait_time_written,
+        .tick_count,
+        .excitation_axis,
+        .excitation_period,
+        .excitation_limit,
+        .excitation_value,
+        .excitation_value_at,
+        .excitation_value_written,
+        .scope_state_phase    (2'd0),
+        .scope_state_available(17'd0),
+        .scope_word           (32'd0),
+        .scope_word_read,
+        .scope_axis,
+        .scope_last,
+        .scope_trigger,
+        .scope_mode,
+        .scope_channels_0,
+        .scope_channels_4,
+        .scope_samples_length,
+        .scope_samples_every,
+        .scope_place_earlier,
+        .scope_place_delay,
+        .scope_level,
+        .scope_level_written
     );
 
     // time
@@ -260,8 +297,8 @@ module axis_on_wishbone #(
         .clk,
         .rst,
         .tick,
-        .tick_period(tick_period[17:0]),
-        .now        (now[31:0]),
+        .tick_period  (tick_period[17:0]),
+        .now          (now[31:0]),
         .stores,
         .stored_at,
         .stored_value,
@@ -278,6 +315,10 @@ module axis_on_wishbone #(
         .block_up,
         .block_down,
         .closed_loop,
+        .enabled      (drive_enable),
+        .tick_count,
+        .stream_states(stream_state),
+        .stream_counts,
         .play,
         .arm,
         .controlled_stop,
@@ -362,6 +403,8 @@ module axis_on_wishbone #(
         .rate_restart,
         .rate_steep,
         .line_stopped,
+        .stream_state,
+        .stream_counts,
         .chain_setting_written,
         .chain_harmonic_enable,
         .chain_learn,
@@ -415,7 +458,16 @@ module axis_on_wishbone #(
         1'b0, chain_setting_written, chain_harmonic_enable, chain_learn, sample_valid, sample_sin,
         sample_cos, quadrature_count
     };
-    wire unused_recorder = &{1'b0, target, phase, fine_command, faults};
+    wire unused_signals = &{1'b0, target, phase, fine_command, faults};
+    wire unused_excitation = &{
+        1'b0, excitation_axis, excitation_period, excitation_limit, excitation_value,
+        excitation_value_at, excitation_value_written
+    };
+    wire unused_recorder = &{
+        1'b0, scope_word_read, scope_axis, scope_last, scope_trigger, scope_mode, scope_channels_0,
+        scope_channels_4, scope_samples_length, scope_samples_every, scope_place_earlier,
+        scope_place_delay, scope_level, scope_level_written
+    };
 endmodule
 
 `default_nettype wire
