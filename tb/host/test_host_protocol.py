@@ -238,6 +238,12 @@ def test_the_timeout_grows_with_the_number_of_expected_words():
     assert exchange.expected == 4
 
 
+def test_a_request_without_an_operation_is_answered_as_operation_0():
+    exchange = Exchange(1, bytes([7]), tries=1)
+    exchange.feed([0x61, *reply_words(operation=0, cause=1)])
+    assert exchange.finished and exchange.result() == (7, 0, 1, {})
+
+
 def test_the_shortest_reply_that_is_waited_for_has_one_byte():
     exchange = Exchange(1, ENABLE)
     exchange.feed([0x61, 0x51, 1])
