@@ -169,6 +169,10 @@ def test_the_largest_table_and_the_largest_points_are_written():
     for point in (1 << 23, -(1 << 23)):
         with pytest.raises(OutOfRange, match="table is above 102.4um: 128 periods are the most"):
             segments.check_points([0, point])
+    segments.use("off")
+    segments.axis.set_parameter("period", "512.34nm")
+    with pytest.raises(OutOfRange, match="table is above 65.58um: 128 periods"):
+        segments.check_points([0, 1 << 23])
 
 
 def test_of_more_points_than_there_are_segments_the_first_ones_are_read():
