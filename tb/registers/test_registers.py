@@ -334,9 +334,7 @@ def bench(name):
     return f"{name}_bench"
 
 
-@pytest.mark.parametrize(
-    "block", ["node", "bus", "link", "peripherals", "axis", "feedback", "actuator"]
-)
+@pytest.mark.parametrize("block", [block.name for block in tables.read()])
 def test_registers(block):
     run(bench(block), __file__)
 
