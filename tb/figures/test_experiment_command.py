@@ -28,7 +28,7 @@ def main_of(experiment, monkeypatch, run):
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_seed_and_folder_of_the_report_are_those_of_the_command_line(
-    experiment, monkeypatch, tmp_path, capsys
+    experiment, monkeypatch, tmp_path
 ):
     asked = []
     main = main_of(experiment, monkeypatch, lambda *words: asked.extend(words) or [command])

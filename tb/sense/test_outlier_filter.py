@@ -96,6 +96,8 @@ async def hold_255_is_the_filter_of_s0_and_never_returns(dut):
         out = await stream(dut, model, [(0, 0)] + [far] * 600, 10, 255)
         assert out == [(0, 0, 0)] + [(0, 0, 1)] * 600
         assert await stream(dut, model, [near, far], 10, 255) == [(*near, 0), (*near, 1)]
+        await stream(dut, model, [far] * 299, 10, 255)  # the count of samples stops at its end
+        assert await stream(dut, model, [far], 10, 100) == [(*far, 0)]
 
 
 @cocotb.test()

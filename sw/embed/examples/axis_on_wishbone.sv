@@ -99,7 +99,7 @@ module axis_on_wishbone #(
     wire        [47:0] target;
     wire [15:0] phase, fine_command;
     wire [12:0] faults;
-    // registers of streamed set-points, which only the count of ticks is of use for here
+    // the count of servo ticks, and the state of streamed set-points, which there are not
     wire [31:0] tick_count, stream_state, stream_counts;
     // registers of a recorder of ticks, which there is not
     wire [2:0] excitation_axis, scope_axis, scope_last, scope_mode;
