@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""register_width: every word of the register map, and addresses without a block."""
+"""register_width: every address, in a block and outside all blocks."""
 
 import cocotb
 from cocotb.triggers import Timer
@@ -12,7 +12,7 @@ from tb.registers.register_width import low_words
 async def latency_is_0_and_each_word_is_reported_as_the_model_says(dut):
     low = low_words()
     assert len(low) > 50 and 0x010 // 4 in low
-    for address in [*range(64 * 32), *(1 << n for n in range(11, 14)), (1 << 14) - 1]:
+    for address in range(1 << 14):
         dut.address.value = address
         await Timer(1, "ns")
         assert int(dut.low.value) == (address in low), f"word {address:#x}"

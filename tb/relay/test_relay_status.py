@@ -49,6 +49,13 @@ async def latency_is_0_and_each_event_has_its_own_bit(dut):
 
 
 @cocotb.test()
+async def each_flag_alone_is_a_fault(dut):
+    for bit in range(8):
+        assert (await outputs(dut, flags=1 << bit))["fault"]
+    assert not (await outputs(dut))["fault"]
+
+
+@cocotb.test()
 async def it_corrects_with_a_set_and_a_known_angle(dut):
     assert (await outputs(dut, known=1, loaded=1))["levels"] == KNOWN | LOADED | CORRECTING
     assert not (await outputs(dut, known=1))["correcting"]
