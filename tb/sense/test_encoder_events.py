@@ -10,6 +10,8 @@ from cocotb.triggers import Timer
 
 from tb.bench import run
 from tb.sense.encoder_events import (
+    AMPLITUDE_HIGH,
+    AMPLITUDE_LOW,
     DISAGREEMENT,
     ILLEGAL_EDGE,
     OVERSPEED,
@@ -43,14 +45,17 @@ async def outputs(dut, **inputs):
 
 
 @cocotb.test()
-async def latency_is_0_and_each_event_has_its_own_bit(dut):
-    for name, bit in (
-        ("illegal_edge", ILLEGAL_EDGE),
-        ("overspeed", OVERSPEED),
-        ("disagreement", DISAGREEMENT),
+async def latency_is_0_and_each_event_has_its_own_bit_and_its_own_mask(dut):
+    for cause, bit in (
+        (dict(illegal_edge=1), ILLEGAL_EDGE),
+        (dict(overspeed=1), OVERSPEED),
+        (dict(signal_faults=1), AMPLITUDE_LOW),
+        (dict(signal_faults=2), AMPLITUDE_HIGH),
+        (dict(disagreement=1), DISAGREEMENT),
+        (dict(edge_rejected=1, decoder_mode=PULSES), PULSE_TOO_SHORT),
     ):
         for mask in (bit, 63 - bit):
-            got = await outputs(dut, event_mask=mask, **{name: 1})
+            got = await outputs(dut, event_mask=mask, **cause)
             assert (got["events"], got["fault"]) == (bit, int(mask == bit))
 
 
