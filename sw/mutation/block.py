@@ -172,6 +172,7 @@ def prepared(
             f"chparam{change} {top}" if change else "",
             f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
             f"prep -top {top}; write_json {folder}/interface.json",
+            "opt_expr -mux_undef; opt_clean",  # a word that is not written has an address too
             f"write_rtlil {folder}/{ELABORATED}",
             *lists.values(),
         ]
