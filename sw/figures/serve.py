@@ -31,8 +31,9 @@ from moire.bus.transport import open_bus
 from moire.client.bus import Bus
 from moire.errors import MoireError, PortError
 from moire.made.bus_tables import PARAMETERS
-from moire.web.api import OPERATIONS, Operation, checked, find
+from moire.web.api import OPERATIONS, find
 from moire.web.client import StreamClient
+from moire.web.operation import Operation, checked
 from twin.build import ROOT
 
 AXIS = "/api/nodes/1/axes/0"

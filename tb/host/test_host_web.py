@@ -252,7 +252,7 @@ def test_the_owner_may_be_a_client_of_tcp(served):
 
 
 def test_an_axis_is_taken_over_from_another_client(served, monkeypatch):
-    monkeypatch.setattr("moire.web.api.REACT_S", 0)
+    monkeypatch.setattr("moire.web.handlers.REACT_S", 0)
     with served.http() as first, served.http() as second:
         first.done("POST", f"{AXIS}/move", {"to": "100 mm", "wait": False})
         taken = second.done("POST", f"{AXIS}/take")
@@ -266,7 +266,7 @@ def test_an_axis_is_taken_over_from_another_client(served, monkeypatch):
 
 
 def test_a_move_may_take_the_axis_over_by_itself(served, monkeypatch):
-    monkeypatch.setattr("moire.web.api.REACT_S", 0)
+    monkeypatch.setattr("moire.web.handlers.REACT_S", 0)
     with served.http() as first, served.http() as second:
         first.done("POST", f"{AXIS}/move", {"to": "100 mm", "wait": False})
         body = {"by": "1 um", "take": True}
@@ -796,7 +796,7 @@ def test_a_defect_of_the_server_is_an_answer_too(shared, monkeypatch, capfd):
     def broken(*_):
         raise ZeroDivisionError("on purpose")
 
-    monkeypatch.setattr("moire.web.api.node_values", broken)
+    monkeypatch.setattr("moire.web.handlers.node_values", broken)
     with shared.http() as client:
         status, values = client.ask("GET", "/api/nodes/1")
         assert (status, values["error"]["cause"]) == (500, "internal")

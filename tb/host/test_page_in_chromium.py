@@ -330,7 +330,7 @@ def test_a_network_that_is_gone_stops_a_jog(served, context):
 
 
 def test_two_pages_share_an_axis(served, page, context, monkeypatch):
-    monkeypatch.setattr("moire.web.api.REACT_S", 0)
+    monkeypatch.setattr("moire.web.handlers.REACT_S", 0)
     other = opened(context, served.door.url)
     move(page, "100")
     moving(served)

@@ -14,8 +14,9 @@ from typing import Any
 
 from moire.errors import MoireError
 from moire.web.access import Access, too_many
-from moire.web.api import AXIS, Call, Operation, checked, find, whole_number
+from moire.web.api import AXIS, find
 from moire.web.bridge import Bridge, Client
+from moire.web.operation import Call, Operation, checked, whole_number
 from moire.web.refusals import BadRequest, body_of, status_of
 
 BY_NAME, LONGEST_NAME = "/api/axes/", 40

@@ -8,7 +8,8 @@ from importlib.metadata import version
 from typing import Any
 
 from moire.web.access import TOKEN_BYTES
-from moire.web.api import OPERATIONS, Given, Operation
+from moire.web.api import OPERATIONS
+from moire.web.operation import Given, Operation
 from moire.web.stream import WISHES
 
 SCHEMAS: Mapping[str, dict[str, Any]] = {  # of the types that the table names

@@ -34,8 +34,9 @@ from moire.web.answers import (
     text_of,
     values_of,
 )
-from moire.web.api import Given, checked, status_values, whole_number
 from moire.web.bridge import Client
+from moire.web.handlers import status_values
+from moire.web.operation import Given, checked, whole_number
 from moire.web.refusals import BadRequest
 
 NORMAL_ENDS = (asyncio.CancelledError, WebSocketDisconnect, PortError)
