@@ -2,7 +2,7 @@
 """Make rtl/control/engine_words.sv: which registers are words of motion_engine.
 
 The property `engine` of a register in tables/registers.rdl is the name of its word, one of the
-settings in tables/engine_microcode.py, with the bits by which its value is shifted left. A word of
+settings in tables/microcode/numbers.py, with the bits by which its value is shifted left. A word of
 the engine has the number of its register with bit 4 inverted.
 """
 
@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tables import engine_microcode, made_files, registers
+from tables import made_files, registers
+from tables.microcode.numbers import SETTINGS
 
 MADE = made_files.ROOT / "rtl" / "control" / "engine_words.sv"
 BLOCKS = ("axis", "feedback", "actuator")  # by their kind
@@ -55,7 +56,7 @@ def words() -> list[Word]:
             if block.base != BASE + kind * BLOCKS_OF_KIND * registers.SLOT:
                 raise ValueError(f"registers.rdl: the block {block.name} is not where it should be")
             name, _, shift = r.engine.partition(" << ")
-            number = engine_microcode.SETTINGS.get(name)
+            number = SETTINGS.get(name)
             if number is None and name not in (FILTER_ADDRESS, FILTER_VALUE):
                 raise ValueError(f"registers.rdl: {r.name}: the engine has no word {name}")
             if number not in (None, r.word + r.wide ^ 0x10):
@@ -64,7 +65,7 @@ def words() -> list[Word]:
                 raise ValueError(f"registers.rdl: {r.name}: its value is not the whole word")
             signed = r.fields[0].signed
             found.append(Word(kind, r.word + r.wide, name, int(shift or 0), r.wide, signed))
-    missing = {*engine_microcode.SETTINGS} - {w.name for w in found}
+    missing = {*SETTINGS} - {w.name for w in found}
     if missing:
         raise ValueError(f"registers.rdl: no register is the word {sorted(missing)[0]}")
     return found

@@ -2,7 +2,8 @@
 """Figure of the motion engine: how many cycles a servo tick needs at most."""
 
 from figures.common import Figure, Quick
-from tables.engine_microcode import assembled, worst
+from tables.microcode.assembler import assembled
+from tables.microcode.timing import worst
 
 
 def engine_tick_cycles(axes: int = 8) -> float:

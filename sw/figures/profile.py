@@ -12,7 +12,7 @@ from pathlib import Path
 import ruckig  # type: ignore[import-not-found]
 
 from figures.common import Figure, Quick, bar, console, shares
-from tables.engine_microcode import ADDRESS, OPERANDS
+from tables.microcode.numbers import ADDRESS, OPERANDS
 from twin.build import (
     ROOT,
     VERILATED,

@@ -60,7 +60,7 @@ struct Bench {
         pins.rst = 1, clk(), clk(), pins.rst = 0;
         while (!pins.ready) clk();
     }
-    // The numbers of the words are those of tables/engine_microcode.py.
+    // The numbers of the words are those of tables/microcode/numbers.py.
     void setting(unsigned word, uint64_t value) {
         pins.setting_write = 1, pins.setting_word = word, pins.setting = value, clk();
         pins.setting_write = 0;

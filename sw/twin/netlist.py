@@ -139,7 +139,10 @@ def primitives(family: str) -> str:
 
 
 def literal(value: int | str) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(int(value))
+    """A parameter as Yosys reads it, which knows no sign."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(int(value)) if value >= 0 else f"32'h{value & 0xFFFFFFFF:08x}"
 
 
 def parts(source: Path, folders: Sequence[Path]) -> dict[Path, str]:

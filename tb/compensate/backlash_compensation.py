@@ -3,7 +3,7 @@
 of the table; lengths in 2^-16 period.
 """
 
-from tables.engine_microcode import GIVEN
+from tables.microcode.numbers import GIVEN
 
 
 class BacklashCompensation:

@@ -8,7 +8,7 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tables.engine_microcode import GIVEN
+from tables.microcode.numbers import GIVEN
 from tb.bench import run, start
 from tb.compensate.backlash_compensation import BacklashCompensation
 

@@ -3,8 +3,8 @@
 then advances one cycle.
 """
 
-from tables.engine_microcode import SETTINGS
 from tables.engine_words import SEGMENT
+from tables.microcode.numbers import SETTINGS
 from tb.control.engine_words import FOUND
 
 WORD = 1 << 32

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/control/engine_memory.sv: clk(...) advances one cycle and returns what was read."""
 
-from tables.engine_microcode import ADDRESS, CONSTANTS
+from tables.microcode.numbers import ADDRESS, CONSTANTS
 
 
 class EngineMemory:

@@ -3,7 +3,7 @@
 shows in this cycle, clk(...) then advances one cycle; `levels` is what it holds.
 """
 
-from tables.engine_microcode import FLAGS, GIVEN
+from tables.microcode.numbers import FLAGS, GIVEN
 
 MOVING, ARMED = (1 << FLAGS.index(name) + 1 for name in ("moving", "armed"))
 

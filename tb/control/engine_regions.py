@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/control/engine_regions.sv: region_of(line)."""
 
-from tables.engine_microcode import REGIONS, assembled, regions
+from tables.microcode.assembler import assembled
+from tables.microcode.timing import REGIONS, regions
 
 FOUND = [REGIONS.index(name) for name in regions(assembled())]
 

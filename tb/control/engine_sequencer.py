@@ -3,7 +3,8 @@
 after it.
 """
 
-from tables.engine_microcode import ACTIONS, CONDITIONS, LINES, codes
+from tables.microcode.assembler import LINES, codes
+from tables.microcode.numbers import ACTIONS, CONDITIONS
 
 
 class EngineSequencer:

@@ -3,7 +3,7 @@
 between two ticks, tick(...) a servo tick; both return what the engine reports, in its order.
 """
 
-from tables.engine_microcode import FLAGS
+from tables.microcode.numbers import FLAGS
 
 FULL = 1 << 32  # of a rate
 DEPTH = 16  # segments in the queue

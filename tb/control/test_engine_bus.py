@@ -10,7 +10,7 @@ import pytest
 from cocotb.triggers import FallingEdge, RisingEdge, Timer
 
 from moire.made.registers import FIELDS
-from tables.engine_microcode import OPERANDS
+from tables.microcode.numbers import OPERANDS
 from tb.bench import run, start
 from tb.control.engine_bus import EngineBus
 from tb.control.engine_words import FOUND

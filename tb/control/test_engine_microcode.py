@@ -9,15 +9,9 @@ from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
 from tables import engine_microcode
-from tables.engine_microcode import (
-    ADDRESS,
-    LINES,
-    assembled,
-    codes,
-    missing,
-    parsed,
-    worst,
-)
+from tables.microcode.assembler import LINES, assembled, codes, missing, parsed
+from tables.microcode.numbers import ADDRESS
+from tables.microcode.timing import worst
 from tb.bench import run
 
 

@@ -8,7 +8,7 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge, Timer
 
-from tables.engine_microcode import GIVEN
+from tables.microcode.numbers import GIVEN
 from tb.bench import run, start
 from tb.control.engine_outputs import ARMED, MOVING, EngineOutputs
 

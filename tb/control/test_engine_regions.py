@@ -4,7 +4,7 @@
 import cocotb
 from cocotb.triggers import Timer
 
-from tables.engine_microcode import LINES
+from tables.microcode.assembler import LINES
 from tb.bench import run
 from tb.control.engine_regions import region_of
 

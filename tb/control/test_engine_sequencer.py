@@ -7,7 +7,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tables.engine_microcode import ACTIONS
+from tables.microcode.numbers import ACTIONS
 from tb.bench import run, start
 from tb.control.engine_sequencer import EngineSequencer
 

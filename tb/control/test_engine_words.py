@@ -6,8 +6,8 @@ its register, in the unit that docs/engine.md states.
 import cocotb
 from cocotb.triggers import Timer
 
-from tables.engine_microcode import FILTER_SETTINGS, OPERANDS, SETTINGS
 from tables.engine_words import FILTER_VALUE, words
+from tables.microcode.numbers import FILTER_SETTINGS, OPERANDS, SETTINGS
 from tb.bench import run
 from tb.control.engine_words import facts
 

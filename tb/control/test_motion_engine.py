@@ -10,14 +10,9 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from tables.engine_microcode import (
-    CONDITIONS,
-    FILTER_SETTINGS,
-    GIVEN,
-    OPERANDS,
-    assembled,
-    worst,
-)
+from tables.microcode.assembler import assembled
+from tables.microcode.numbers import CONDITIONS, FILTER_SETTINGS, GIVEN, OPERANDS
+from tables.microcode.timing import worst
 from tb.bench import needs, rtl_only, run, start
 from tb.control.motion_engine import LAST, Axis, moved, wrap
 

@@ -9,7 +9,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, Timer
 
-from tables.engine_microcode import GIVEN
+from tables.microcode.numbers import GIVEN
 from tb.bench import needs, run, start
 from tb.control import motion_engine, set_point_axis
 from tb.control.set_point_axis import MARGIN
