@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from figures.common import Figure, Quick, bar, console
-from twin.compiled.node import PARAMETER
 from twin.compiled.station import TURN, Station
+from twin.compiled.tables import PARAMETER
 
 CUTS = 1000
 JOURNAL_SHARE, SETTINGS_SHARE = 0.2, 0.3  # of the cuts; the others come while a job is written

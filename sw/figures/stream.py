@@ -2,7 +2,7 @@
 """Figures of streams: the compiled firmware plays a path whose set-points come irregularly, get
 lost, overtake each other or come twice.
 
-The player is that of twin.compiled.node, which adds up the pieces as they are pushed; so its target
+The player is that of twin.compiled.axis, which adds up the pieces as they are pushed; so its target
 jumps wherever the pieces do.
 """
 
@@ -13,7 +13,9 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from figures.common import Figure, Quick, console
-from twin.compiled.node import DEFINES, PARAMETER, PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import DEFINES, PARAMETER, PERIOD
 
 CYCLES = 1_000_000
 CLK_HZ = 60_000_000

@@ -6,16 +6,9 @@ import zlib
 from moire.bus.transport import BAUD
 from moire.made.bus_tables import PARAMETERS
 from tb.fakes.rs485_bus import Rs485Port, register
-from twin.compiled.node import (
-    CAUSE,
-    CLK_HZ,
-    DEFINES,
-    PERIOD,
-    STATE,
-    TABLE,
-    Axis,
-    CompiledNode,
-)
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import CAUSE, CLK_HZ, DEFINES, PERIOD, STATE, TABLE
 
 START = 123456  # where an axis is at power-up, 2^-16 period
 SWITCH = -10 * PERIOD  # where its switch at the low end closes

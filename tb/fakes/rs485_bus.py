@@ -15,7 +15,8 @@ from moire.made.bus_tables import OPERATIONS
 from tb.interlock.heartbeat_watchdog import HeartbeatWatchdog
 from tb.serial.address_filter import AddressFilter
 from tb.serial.frame_check import FrameCheck
-from twin.compiled.node import CLK_HZ, DEFINES, FAULT, TABLE, fields
+from twin.compiled.node import fields
+from twin.compiled.tables import CLK_HZ, DEFINES, FAULT, TABLE
 
 SILENT = 0x1FF  # what a node that does not drive the bus adds to it
 CLOCKS_DIFFER = 0.04  # the largest difference of two baud rates at which words arrive

@@ -9,7 +9,9 @@ import pytest
 from tables.bus import register_fields
 from tb.bench import seed
 from twin.build import ROOT
-from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE
 
 COMMAND = DEFINES["BUS_RECEIVE_COMMAND_MASK"]
 GOOD = DEFINES["BUS_RECEIVE_GOOD_MASK"]

@@ -7,7 +7,9 @@ import pytest
 
 from tb.bench import seed
 from tb.firmware.plan_model import distance, limits
-from twin.compiled.node import DEFINES, FAULT, PARAMETER, PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import DEFINES, FAULT, PARAMETER, PERIOD
 
 SET_TARGET = DEFINES["AXIS_STROBES_SET_TARGET_TO_POSITION_MASK"]
 CONTROLLED_STOP = DEFINES["AXIS_STROBES_CONTROLLED_STOP_MASK"]

@@ -3,7 +3,9 @@
 
 import pytest
 
-from twin.compiled.node import FAULT, PARAMETER, PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import FAULT, PARAMETER, PERIOD
 
 OF_DRIVES = {
     "enable": dict(axis=0, on=1),

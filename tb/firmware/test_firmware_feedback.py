@@ -7,7 +7,9 @@ import math
 
 import pytest
 
-from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import CLK_HZ, DEFINES, PARAMETER, TABLE
 
 BLOCK = DEFINES["FEEDBACK_BASE"]
 REASON = {code: name for name, (code, _) in TABLE["calibration_reason"].items()}

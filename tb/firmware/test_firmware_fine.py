@@ -4,7 +4,9 @@
 import pytest
 
 from tb.firmware.test_firmware_axis import CLOSED_LOOP, ENABLE, finish, homed
-from twin.compiled.node import DEFINES, FAULT, PARAMETER, PERIOD, Axis, CompiledNode, signed
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import DEFINES, FAULT, PARAMETER, PERIOD, signed
 
 FINE = DEFINES["AXIS_CONTROL_FINE_MASK"]
 COMMAND = DEFINES["AXIS_COMMAND"]

@@ -7,7 +7,8 @@ import pytest
 
 from tb.firmware.test_firmware_axis import finish, homed
 from tb.firmware.test_firmware_fine import FINE_COMMAND, OPEN_COMMAND, Coarse
-from twin.compiled.node import DEFINES, FAULT, PERIOD, TABLE, CompiledNode
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import DEFINES, FAULT, PERIOD, TABLE
 
 STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}
 TRIM, DAC = DEFINES["ACTUATOR_DAC_TRIM"], DEFINES["ACTUATOR_DAC"]

@@ -8,7 +8,9 @@ import random
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import DEFINES, PARAMETER, PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import DEFINES, PARAMETER, PERIOD
 
 QUARTER = PERIOD // 4
 COUNTS = 1  # position_source

@@ -5,7 +5,9 @@ that no word of the bus ends.
 
 import pytest
 
-from twin.compiled.node import PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import PERIOD
 
 OFF, HOLDING = 64, 1  # ticks
 LOADED_POLLS = 200  # until the calibration has loaded its first table

@@ -7,7 +7,9 @@ import pytest
 
 from tb.bench import seed
 from tb.firmware.plan_model import limits, steps
-from twin.compiled.node import DEFINES, PARAMETER, PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import DEFINES, PARAMETER, PERIOD
 
 TRAVEL = {
     "travel_low": -5000 * PERIOD,

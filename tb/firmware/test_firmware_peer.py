@@ -10,8 +10,10 @@ import zlib
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import CAUSE, PARAMETER, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
 from twin.compiled.peripherals import I2c, PeerPort, PeripheralParts, Sensor, Table
+from twin.compiled.tables import CAUSE, PARAMETER, TABLE
 
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 PHASE = {code: name for name, (code, _) in TABLE["peer_phase"].items()}

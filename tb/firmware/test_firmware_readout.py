@@ -5,8 +5,10 @@ from fractions import Fraction
 
 import pytest
 
-from twin.compiled.node import PARAMETER, PERIOD, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
 from twin.compiled.peripherals import NumericDisplay, PeripheralParts
+from twin.compiled.tables import PARAMETER, PERIOD, TABLE
 
 SETTING = TABLE["setting"]
 

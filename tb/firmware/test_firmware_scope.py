@@ -3,7 +3,9 @@
 
 import pytest
 
-from twin.compiled.node import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE
 
 TRIGGER = {name: code for name, (code, _) in TABLE["scope_trigger"].items()}
 SCOPE_STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}

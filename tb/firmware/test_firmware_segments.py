@@ -5,7 +5,9 @@ with a zero, and it begins at the zero.
 
 import pytest
 
-from twin.compiled.node import CAUSE, DEFINES, PARAMETER, PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import CAUSE, DEFINES, PARAMETER, PERIOD
 
 POINTS = [100 * n - 500 for n in range(30)]
 LENGTH, FIRST = 1000 * PERIOD, -2000 * PERIOD

@@ -5,7 +5,8 @@ image does not have it.
 
 import pytest
 
-from twin.compiled.node import TABLE, CompiledNode
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import TABLE
 
 SETTING = TABLE["setting"]
 

@@ -5,7 +5,9 @@ built.
 
 import pytest
 
-from twin.compiled.node import PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import PERIOD
 
 OF_SINE = {
     "calibration": dict(axis=0, action=1),

@@ -12,7 +12,9 @@ import pytest
 from tb.bench import seed
 from tb.control import motion_engine
 from tb.firmware.stream_model import cubic, pieces_to, targets
-from twin.compiled.node import CLK_HZ, PERIOD, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import CLK_HZ, PERIOD
 
 ONE = 1 << 40  # a period
 TAIL = 150_000 * 4000 // CLK_HZ + 4  # ticks of the last piece of a set-point

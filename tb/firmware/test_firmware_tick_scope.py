@@ -5,7 +5,9 @@ waveform that ends with any request to its axis but a motion, and what is refuse
 
 import pytest
 
-from twin.compiled.node import DEFINES, FAULT, PERIOD, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import DEFINES, FAULT, PERIOD, TABLE
 
 SIGNAL = {name: code for name, (code, _) in TABLE["tick_signal"].items()}
 MODE = {name: code for name, (code, _) in TABLE["tick_trigger"].items()}

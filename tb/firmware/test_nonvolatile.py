@@ -9,8 +9,10 @@ import zlib
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import PARAMETER, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
 from twin.compiled.station import SETTING, Station
+from twin.compiled.tables import PARAMETER, TABLE
 
 COPIES = (8192, 12288)
 VALUE = 16  # bytes

@@ -8,8 +8,10 @@ import random
 import pytest
 
 from tb.bench import seed
-from twin.compiled.node import CAUSE, FAULT, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
 from twin.compiled.peripherals import TURN_ARCSEC, PeripheralParts, Sensor, Table
+from twin.compiled.tables import CAUSE, FAULT, TABLE
 
 PHASE = {code: name for name, (code, _) in TABLE["turn_phase"].items()}
 SETTING = TABLE["setting"]

@@ -29,7 +29,8 @@ from moire.made.registers import MAP_CRC
 from tb.bench import seed
 from tb.fakes.bus_node import START, SWITCH, BusNode, CannedNode, other_protocol
 from tb.fakes.rs485_bus import Rs485Bus
-from twin.compiled.node import FAULT, PERIOD, Axis
+from twin.compiled.axis import Axis
+from twin.compiled.tables import FAULT, PERIOD
 
 SEED = seed()
 

@@ -23,7 +23,8 @@ from moire.made.bus_tables import PARAMETERS
 from tb.fakes.bus_node import START, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from twin import BuildError
-from twin.compiled.node import DEFINES, FAULT, PERIOD, Axis
+from twin.compiled.axis import Axis
+from twin.compiled.tables import DEFINES, FAULT, PERIOD
 
 
 class Call:

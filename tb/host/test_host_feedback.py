@@ -17,7 +17,7 @@ from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.firmware.test_firmware_feedback import Signal
 from tb.host.test_host_command_line import Call, sentence
-from twin.compiled.node import DEFINES, FAULT
+from twin.compiled.tables import DEFINES, FAULT
 
 VELOCITY = PARAMETERS["velocity"].id
 STROBES, SOURCES = DEFINES["FEEDBACK_STROBES"], DEFINES["FEEDBACK_CAPTURE_SOURCES"]

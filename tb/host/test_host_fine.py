@@ -22,7 +22,7 @@ from tb.bench import ROOT, seed
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
-from twin.compiled.node import FAULT, PERIOD
+from twin.compiled.tables import FAULT, PERIOD
 
 SEED = seed()
 TICK = 1 / 4000

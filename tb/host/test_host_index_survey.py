@@ -22,7 +22,8 @@ from tb.bench import seed
 from tb.fakes.bus_node import BusNode
 from tb.fakes.index_axis import COUNT_NM, IndexAxis
 from tb.host.test_host_command_line import Call, sentence
-from twin.compiled.node import PERIOD, Axis
+from twin.compiled.axis import Axis
+from twin.compiled.tables import PERIOD
 
 SHIFTS = (1 / 6, -1 / 9, -1 / 18, 1 / 9)  # duty 20 degrees, phase 10 degrees, rounded
 

@@ -24,7 +24,7 @@ from tables import faults
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
-from twin.compiled.node import FAULT, PERIOD
+from twin.compiled.tables import FAULT, PERIOD
 
 TEXT = """\
 text = "a test machine"

@@ -17,7 +17,7 @@ from moire.web import lissajous
 from moire.web.client import ServerRefused
 from moire.web.recording import POLL_S
 from tb.fakes.served import Served, homed
-from twin.compiled.node import DEFINES
+from twin.compiled.tables import DEFINES
 
 AXIS = "/api/nodes/1/axes/0"
 NEVER = {"trigger": "fault"}

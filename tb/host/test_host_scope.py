@@ -13,7 +13,8 @@ from moire.errors import OutOfRange, Refused
 from tb.fakes.bus_node import START, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
-from twin.compiled.node import DEFINES, PERIOD, Axis, signed
+from twin.compiled.axis import Axis
+from twin.compiled.tables import DEFINES, PERIOD, signed
 
 
 def axis_of(node):

@@ -15,7 +15,7 @@ from moire.errors import BadFile, MotionFailed, OutOfRange, Refused
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
-from twin.compiled.node import PERIOD
+from twin.compiled.tables import PERIOD
 
 PERIOD_NM = 800
 GOOD = ["0, 0, 0", "40, 0.01, 0.4", "80, 0.02, 0"]

@@ -19,7 +19,8 @@ from moire.made.bus_tables import FAULTS
 from tb.fakes.bus_node import START, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.test_host_command_line import Call, sentence
-from twin.compiled.node import DEFINES, PERIOD, Axis
+from twin.compiled.axis import Axis
+from twin.compiled.tables import DEFINES, PERIOD
 
 WORDS = 1024
 

@@ -19,7 +19,8 @@ from moire.errors import MotionFailed, OutOfRange, Refused, UnknownName
 from moire.made.bus_tables import SETTINGS
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.firmware.test_turn import Station
-from twin.compiled.node import Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
 from twin.compiled.peripherals import I2c, PeerPort, PeripheralParts, Sensor
 from twin.compiled.peripherals import Table as Worm
 

@@ -14,7 +14,7 @@ from tb.fakes.served import Served, homed
 from tb.host.test_host_feedback import node_with_signal
 from tb.host.test_host_job import Workshop
 from tb.host.test_host_page_scope import turning
-from twin.compiled.node import PERIOD
+from twin.compiled.tables import PERIOD
 
 AXIS = "/api/nodes/1/axes/0"
 RUN = f"{AXIS}/calibration"

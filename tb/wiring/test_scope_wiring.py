@@ -7,7 +7,7 @@ import pytest
 
 from tb.wiring.node import COUNT
 from tb.wiring.test_sine_wiring import SAMPLE, Scale
-from twin.compiled.node import TABLE
+from twin.compiled.tables import TABLE
 
 SIGNALS = {name: code for name, (code, _) in TABLE["tick_signal"].items()}
 TRIGGERS = {name: code for name, (code, _) in TABLE["tick_trigger"].items()}

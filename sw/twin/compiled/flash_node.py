@@ -11,7 +11,8 @@ import zlib
 from collections.abc import Sequence
 
 from moire.bus.transport import Transport
-from twin.compiled.node import CLK_HZ, DEFINES, CompiledNode
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import CLK_HZ, DEFINES
 
 START = 0x20000  # FLASH_START of rtl/node.sv
 SPACING = 0x10000  # bytes from image to image

@@ -9,8 +9,9 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Protocol
 
-from twin.compiled.node import CLK_HZ, DEFINES, PERIOD, CompiledNode
+from twin.compiled.node import CompiledNode
 from twin.compiled.station import Eeprom, I2cBus
+from twin.compiled.tables import CLK_HZ, DEFINES, PERIOD
 
 TURN_ARCSEC = 360 * 3600
 CLK_MS = CLK_HZ // 1000

@@ -13,7 +13,9 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from twin.compiled.node import CLK_HZ, DEFINES, TABLE, Axis, CompiledNode
+from twin.compiled.axis import Axis
+from twin.compiled.node import CompiledNode
+from twin.compiled.tables import CLK_HZ, DEFINES, TABLE
 
 BYTE_CLK, EDGE_CLK = CLK_HZ * 9 // 100_000, CLK_HZ // 100_000  # at 100 kHz
 STATE: dict[int, str] = {code: name for name, (code, _) in TABLE["job_state"].items()}
