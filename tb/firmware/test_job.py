@@ -6,7 +6,9 @@ import random
 import pytest
 
 from tb.bench import seed
-from twin.compiled.station import TURN, Station, SubNode, ms
+from twin.compiled.station import TURN, Station
+from twin.compiled.station_devices import ms
+from twin.compiled.sub_node import SubNode
 
 STATIONS = 4
 ANGLES = [n * TURN // STATIONS for n in range(STATIONS)]

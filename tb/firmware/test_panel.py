@@ -5,7 +5,9 @@ or come late.
 
 import pytest
 
-from twin.compiled.station import KEYS, SETTING, TABLE, TURN, Station
+from twin.compiled.station import SETTING, TURN, Station
+from twin.compiled.station_devices import KEYS
+from twin.compiled.tables import TABLE
 
 
 @pytest.fixture

@@ -6,7 +6,8 @@ import random
 import pytest
 
 from tb.bench import seed
-from twin.compiled.station import SETTING, TURN, Eeprom, Station, ms
+from twin.compiled.station import SETTING, TURN, Station
+from twin.compiled.station_devices import Eeprom, ms
 
 EVENLY = [n * TURN // 36 for n in range(36)]
 

@@ -13,7 +13,8 @@ from moire.client.bus import Bus
 from moire.client.job import Job, equal_parts, read_stations
 from moire.errors import BadFile, OutOfRange, Refused
 from tb.fakes.rs485_bus import Rs485Bus, port_of
-from twin.compiled.station import Station, SubNode
+from twin.compiled.station import Station
+from twin.compiled.sub_node import SubNode
 
 ADDRESS = 2
 

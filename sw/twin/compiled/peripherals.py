@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from twin.compiled.node import CompiledNode
-from twin.compiled.station import Eeprom, I2cBus
+from twin.compiled.station_devices import Eeprom, I2cBus
 from twin.compiled.tables import CLK_HZ, DEFINES, PERIOD
 
 TURN_ARCSEC = 360 * 3600
