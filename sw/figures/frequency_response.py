@@ -5,7 +5,7 @@ import numpy
 from numpy.typing import NDArray
 
 from figures.common import Figure, Quick, console
-from moire.analysis import frequency_response
+from moire.analysis import measured_plant, response_measurement
 from moire.client.access import COUNTS
 from moire.client.bus import Bus
 from twin import WITH_SCOPE, Twin, TwinTransport
@@ -58,7 +58,7 @@ def frf_error_db(low_hz: float = LOWEST_HZ, records: int = 1, seed: int = SEED) 
     axis.set_parameter("home_method", HERE)
     axis.enable()
     axis.home()
-    response = frequency_response.measure(
+    response = response_measurement.measure(
         axis, records=records, low_hz=low_hz, high_hz=HIGHEST_HZ * 1.05
     )
     axis.disable()
@@ -67,7 +67,7 @@ def frf_error_db(low_hz: float = LOWEST_HZ, records: int = 1, seed: int = SEED) 
     hz, size_db = response.hz[inside], 20 * numpy.log10(numpy.abs(ratio))
     delay_s = -numpy.polyfit(hz, numpy.unwrap(numpy.angle(ratio)), 1)[0] / (2 * numpy.pi)
     left = numpy.degrees(numpy.angle(ratio * numpy.exp(2j * numpy.pi * hz * delay_s)))
-    plant = frequency_response.fit(response)
+    plant = measured_plant.fit(response)
     worst = int(numpy.abs(size_db).argmax())
     console.print(
         f"{len(hz)} frequencies from {hz[0]:.2f} to {hz[-1]:.1f} Hz: size within "

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""moire.analysis.frequency_response and proposals: the plant of a simulated loop is measured, its
-model is fitted, gains and a notch keep the margins that they announce, and what shows no response
-is refused.
+"""moire.analysis.frequency_response, measured_plant and proposals: the plant of a simulated loop is
+measured, its model is fitted, gains and a notch keep the margins that they announce, and what shows
+no response is refused.
 """
 
 import io
@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from moire.analysis import frequency_response as measured
-from moire.analysis import proposals, tune
+from moire.analysis import measured_plant, proposals, tune
 from tb.bench import seed
 
 TICK = 1 / 4000
@@ -116,7 +116,7 @@ def test_one_sample_in_some_ticks_suffices_for_low_frequencies():
 
 
 def test_a_model_is_fitted_with_its_resonance(response):
-    plant = measured.fit(response)
+    plant = measured_plant.fit(response)
     assert plant.resonance_hz == pytest.approx(550, abs=2)
     assert plant.damping == pytest.approx(0.05, rel=0.05)
     assert plant.time_constant_s == pytest.approx(0.011, rel=0.05)
@@ -127,13 +127,13 @@ def test_a_model_is_fitted_with_its_resonance(response):
 
 def test_a_plant_without_a_resonance_gets_none(excitation):
     response = measured.computed(excitation, *loop(RIGID, SLOW, excitation, 2), PERIOD_NM)
-    plant = measured.fit(response)
+    plant = measured_plant.fit(response)
     assert plant.damping is None and plant.resonance_hz is None
     assert plant.b == pytest.approx(RIGID.b, rel=0.02)
 
 
 def test_proposals_keep_their_margins_and_a_notch_makes_the_loop_faster(response):
-    plant = measured.fit(response)
+    plant = measured_plant.fit(response)
     found = {one.name: one for one in proposals.of(plant, SLOW)}
     assert list(found) == [proposals.IN_FORCE, proposals.GAINS, proposals.NOTCHED]
     for one in list(found.values())[1:]:
@@ -153,7 +153,7 @@ def test_proposals_keep_their_margins_and_a_notch_makes_the_loop_faster(response
 
 
 def test_margins_that_nothing_keeps_are_refused(response):
-    plant = measured.fit(response)
+    plant = measured_plant.fit(response)
     with pytest.raises(tune.NotTuned, match="less bandwidth"):
         proposals.of(plant, SLOW, bandwidth_hz=900)
     late = tune.Plant(0.0, 1e5, 9, TICK)
@@ -173,13 +173,13 @@ def test_what_shows_no_response_is_refused(excitation):
             measured.computed(excitation, errors, commands, PERIOD_NM)
     unclear = measured.computed(excitation, noise, noise[::-1], PERIOD_NM)
     with pytest.raises(measured.NotCoherent, match="use a larger peak"):
-        measured.fit(unclear)
+        measured_plant.fit(unclear)
     errors, commands = loop(RESONANT, SLOW, excitation, 2)
     with pytest.raises(tune.NotTuned, match="swap"):
-        measured.fit(measured.computed(excitation, -errors, commands, PERIOD_NM))
+        measured_plant.fit(measured.computed(excitation, -errors, commands, PERIOD_NM))
     chaos = measured.computed(excitation, errors, commands, PERIOD_NM)
     turned = measured.Response(
         **{**vars(chaos), "plant": -1j * numpy.exp(1j * numpy.arange(len(chaos.hz)) * 0.9)}
     )
     with pytest.raises(tune.NotTuned, match="not that of a motor"):
-        measured.fit(turned)
+        measured_plant.fit(turned)

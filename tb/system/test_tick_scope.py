@@ -7,7 +7,7 @@ the frequency response with the true one.
 import numpy
 import pytest
 
-from moire.analysis import frequency_response
+from moire.analysis import measured_plant, response_measurement
 from moire.analysis.tick_scope import SIGNALS, TickScope, Trigger
 from moire.analysis.tune import NotTuned
 from moire.bus.transport import open_bus
@@ -50,12 +50,12 @@ def axis(transport):
 
 @pytest.fixture
 def short_periods(monkeypatch):
-    monkeypatch.setattr(frequency_response, "PERIOD", 1024)
+    monkeypatch.setattr(response_measurement, "PERIOD", 1024)
 
 
 def test_before_homing_the_response_is_not_measured(axis):
     with pytest.raises(NotTuned, match="home it first"):
-        frequency_response.measure(axis)
+        response_measurement.measure(axis)
 
 
 def test_a_move_is_recorded_at_each_tick_with_every_signal(axis):
@@ -127,7 +127,7 @@ def test_an_excitation_lasts_as_long_as_a_recording_and_begins_with_its_first_va
 def test_a_peak_without_room_is_refused_and_nothing_moves(axis):
     before = axis.status().position_nm
     with pytest.raises(NotTuned, match="more than half of the output_limit"):
-        frequency_response.measure(axis, "90%")
+        response_measurement.measure(axis, "90%")
     assert axis.status().position_nm == pytest.approx(before, abs=50)
 
 
@@ -136,7 +136,7 @@ def test_without_room_on_either_side_nothing_moves(axis, short_periods):
     before = axis.get_parameter("travel_high")
     axis.set_parameter("travel_high", "50um")
     with pytest.raises(OutOfRange, match="there is no room"):
-        frequency_response.measure(axis, **SHORT)
+        response_measurement.measure(axis, **SHORT)
     axis.write_parameter("travel_high", before.counts)
     assert axis.status().target_nm == pytest.approx(40_000, abs=1)
 
@@ -146,7 +146,7 @@ def test_a_fault_in_a_record_is_named_and_nothing_is_measured(axis, short_period
     limit, override = axis.get_parameter("following_limit"), axis.override()
     axis.set_parameter("following_limit", "4um")
     with pytest.raises(MotionFailed, match="following error"):
-        frequency_response.measure(axis, "40%", **SHORT)
+        response_measurement.measure(axis, "40%", **SHORT)
     assert axis.override() == override and not axis.status().in_motion
     axis.reset()
     axis.write_parameter("following_limit", limit.counts)
@@ -165,7 +165,7 @@ def test_the_response_is_measured_through_a_slow_connection_on_the_side_with_roo
         far = bus.axis(1)
         far.set_parameter("travel_high", "3.1mm")
         gains, override = far.tuning(), far.override()
-        response = frequency_response.measure(far, **SHORT)
+        response = response_measurement.measure(far, **SHORT)
         assert far.tuning() == gains and far.override() == override
         assert far.status().target_nm == pytest.approx(3_000_000, abs=1)
         far.disable()
@@ -173,5 +173,5 @@ def test_the_response_is_measured_through_a_slow_connection_on_the_side_with_roo
     finally:
         server.end()
     assert response.clear.mean() > 0.9 and response.hz[0] < 20 < response.hz[-1]
-    plant = frequency_response.fit(response)
+    plant = measured_plant.fit(response)
     assert plant.unexplained < 0.1 and 0.002 < plant.time_constant_s < 0.05

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Proposals for the servo of an axis whose plant was measured: what each would give, and a picture.
 
-    plant = frequency_response.fit(response)
+    plant = measured_plant.fit(response)
     found = proposals.of(plant, current, margin_degree=50)
     Path("tuning.png").write_bytes(proposals.picture(plant, found))
 
@@ -16,7 +16,8 @@ import numpy
 from numpy.typing import NDArray
 
 from moire.analysis import report
-from moire.analysis.frequency_response import MeasuredPlant, Response
+from moire.analysis.frequency_response import Response
+from moire.analysis.measured_plant import MeasuredPlant
 from moire.analysis.tune import (
     Filter,
     NotTuned,

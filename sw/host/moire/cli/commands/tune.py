@@ -192,7 +192,7 @@ def tune(
     undo: str | None,
 ) -> None:
     """Measures, fits a model of the machine, and computes gains for it."""
-    from moire.analysis import frequency_response, proposals, scope
+    from moire.analysis import measured_plant, proposals, response_measurement, scope
     from moire.analysis import tune as tuner  # NumPy only where it is needed
     from moire.analysis.tick_scope import TickScope
 
@@ -208,14 +208,16 @@ def tune(
         identify = partial(tuner.identify, tuner.Record(*read_record(file), tick_s))
     elif method == RESPONSE or (method is None and TickScope(call.axis).words()):
         nm_s = None if speed is None else speed * 1_000_000
-        response = frequency_response.measure(call.switch_on(), peak, nm_s, records, float(lowest))
+        response = response_measurement.measure(
+            call.switch_on(), peak, nm_s, records, float(lowest)
+        )
         if points:
             write_text(points, response.csv())
-        identify = partial(frequency_response.fit, response)
+        identify = partial(measured_plant.fit, response)
     else:
         record = scope.excite(call.switch_on(), amplitude, every, reach)
         identify = partial(tuner.identify_samples, *scope.lsb(record), tick_s)
-    current = frequency_response.in_force(call.axis)
+    current = response_measurement.in_force(call.axis)
     wished_hz = None if bandwidth is None else float(bandwidth)
     has_filters = call.axis.built().has("filters")
     with call.session.computing():
@@ -315,7 +317,7 @@ def in_words(one: proposals.Proposal) -> str:
 
 def kept(file: str) -> tuner.Tuning:
     """The gains and filters of a file that --keep wrote; raises BadFile."""
-    from moire.analysis import frequency_response
+    from moire.analysis import response_measurement
 
     content = read_json(file)
     try:
@@ -327,7 +329,7 @@ def kept(file: str) -> tuner.Tuning:
         raise BadFile(
             f"the file {file} has no gains and filters: `moire tune --write --keep` makes one"
         ) from None
-    return frequency_response.made(gains, filters)
+    return response_measurement.made(gains, filters)
 
 
 def read_record(file: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
