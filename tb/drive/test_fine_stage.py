@@ -85,18 +85,41 @@ async def it_returns_to_the_middle_slowly_and_drops_to_it_without_the_drive(dut)
 
 
 @cocotb.test()
+async def each_bit_of_the_gains_and_of_the_limit_acts(dut):
+    stage = await Stage(dut).reset()
+    for gain, point, want in (("kp", 16, 256), ("ki", 24, 64), ("kd", 16, 256)):
+        for n in range(24):
+            await stage.clk(rst=1)
+            stage.inputs |= dict(INPUTS, kp=0) | {gain: 1 << n}
+            await stage.clk(gains_changed=1)
+            for _ in range(3):
+                await stage.tick()
+            assert await stage.tick(target=(want << point) >> n) == (want, 0), (gain, n)
+    for n in range(15):
+        await stage.clk(rst=1)
+        stage.inputs |= dict(INPUTS, limit=1 << n)
+        for _ in range(3):
+            await stage.tick()
+        assert await stage.tick(target=1 << 20) == (1 << n, 1)
+
+
+@cocotb.test()
 async def random_ticks_and_a_reset_in_mid_flow_match_the_model(dut):
     stage = await Stage(dut).reset()
-    for n in range(150):
+    middle = 0
+    for n in range(300):
+        reach = 1 << random.randrange(8, 32)
         await stage.tick(
-            target=random.randrange(-3000, 3000),
-            position=random.randrange(-3000, 3000),
+            target=middle + random.randrange(-reach, reach),
+            position=middle + random.randrange(-3000, 3000),
+            limit=random.choice([1000, random.getrandbits(15)]),
             enable=int(random.random() < 0.9),
             hold=int(random.random() < 0.6),
         )
         if n % 20 == 10:
-            gains = dict(kp=18, ki=20, kd=20)
-            stage.inputs.update({name: random.getrandbits(n) for name, n in gains.items()})
+            middle = random.randrange(-(1 << 46), 1 << 46)
+            gains = {name: random.getrandbits(random.randrange(25)) for name in ("kp", "ki", "kd")}
+            stage.inputs.update(gains)
             await stage.clk(gains_changed=1)
         if n % 50 == 40:
             await stage.clk(tick=1)
