@@ -35,6 +35,15 @@ async def latency_is_period_to_the_first_tick_and_between_ticks(dut):
 
 
 @cocotb.test()
+async def each_bit_of_the_period_alone_and_any_upper_bits_are_exact(dut):
+    await start(dut, period=0, restart=0)
+    upper = [random.randrange(128, 256) for _ in range(20)]
+    for period in [*(1 << n for n in range(8)), *upper]:
+        await cycle(dut, period, rst=1)
+        assert await ticks(dut, period, period) == [period]
+
+
+@cocotb.test()
 async def the_longest_period_is_exact(dut):
     longest = (1 << int(dut.W.value)) - 1
     needs(longest < 1 << 10, "the longest period takes too long, and a narrow build shows as much")

@@ -68,6 +68,8 @@ async def packets_of_all_lengths_arrive(dut):
     decoder = await Decoder(dut).begin()
     lengths = [*range(1, 8), 253, 254, 255, 256, 508, 509, 512]
     contents = [some(n) for n in lengths] + [bytes([7]) * n for n in lengths] + [bytes(300)]
+    codes = [255 - (1 << n) for n in range(8)]  # one bit from that of a block without a zero
+    contents += [bytes([7]) * (code - 1) + b"\0\7" for code in codes]
     for content in contents:
         line = b"\0" + cobs.encode(content) + b"\0"
         assert await decoder.send(line, len(line) < 20) == [b"", content]
