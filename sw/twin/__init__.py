@@ -6,17 +6,16 @@ are in parameters/.
 from twin.devices.devices import Devices, DevicesBench, EdmCut, PeerLineBench
 from twin.machines.machine import Machine
 from twin.machines.ring import RotaryRing
+from twin.nodes.frame_bench import FrameBench, cells_of
+from twin.nodes.transport import TwinTransport
 from twin.nodes.twin import (
     START_S,
     WITH_SCOPE,
     WITH_SEGMENTS,
     Axis,
     BusState,
-    FrameBench,
     Node,
     Twin,
-    TwinTransport,
-    cells_of,
     realtime_factor,
 )
 

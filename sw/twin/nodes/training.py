@@ -12,7 +12,8 @@ import numpy
 from twin import build
 from twin.machines.machine import FUNCTIONS as MACHINE_FUNCTIONS
 from twin.machines.machine import declare, pack
-from twin.nodes.twin import BAUD, FUNCTIONS
+from twin.nodes.library import FUNCTIONS
+from twin.nodes.twin import BAUD
 
 CYCLES = 1_200_000  # the soft core waits from 900 000 on
 ASK_CYCLES = 100_000  # from one question of the host to the next

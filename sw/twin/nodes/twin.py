@@ -22,32 +22,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any
 
 import numpy
 import numpy.typing
 
 from twin import build
-from twin.devices.devices import FUNCTIONS as DEVICES_FUNCTIONS
-from twin.devices.devices import PEER_FUNCTIONS, Devices, DevicesHandle, PeerLineHandle
+from twin.devices.devices import Devices, DevicesHandle, PeerLineHandle
 from twin.devices.devices import pack as pack_devices
-from twin.machines.machine import FUNCTIONS as MACHINE_FUNCTIONS
-from twin.machines.machine import (
-    HANDLE,
-    LONG,
-    REAL,
-    WHOLE,
-    Functions,
-    MachineHandle,
-    Trace,
-    declare,
-    pack,
-)
-
-if TYPE_CHECKING:
-    from moire.bus.transport import Transport
-else:
-    Transport = object  # the twin runs without the host package
+from twin.machines.machine import MachineHandle, Trace, pack
+from twin.nodes.library import array, library, memory_image
 
 CLK_HZ = 2_400_000
 START_S = 0.05  # until the soft core of a node with one axis listens, with a margin of 30 ms
@@ -75,48 +59,11 @@ WITH_SEGMENTS = {
 }  # and with its segment table, which takes a fifteenth of the speed
 WITH_SCOPE = {**WITH_SEGMENTS, "FILTERS": 2, "SCOPE_WORDS": 16384}  # and with all to tune its servo
 BAUD = 115200
-BREAK_S = 0.003  # the line low; nodes want 2 ms
-# the host hears a word half a cell before its end; the node's driver lets go half a cell after it
-TURNAROUND_CELLS = 2
 CELLS = 11  # of a character: start, eight data, 9th, stop
 PEER_BAUD = 9600  # between nodes
 LINK_BIT_CYCLES = 5  # of the real-time link: 12 Mbaud at 60 MHz
 ALL_PERIPHERALS = dict.fromkeys(PERIPHERALS, 1)
 CUTS = {"none": 0, "idle": 1, "break": 2}
-
-FUNCTIONS: Functions = {
-    "twin_axes": (WHOLE, []),
-    "twin_memory_words": (WHOLE, []),
-    "twin_new": (HANDLE, [LONG, WHOLE, HANDLE, HANDLE, WHOLE, HANDLE, HANDLE, REAL]),
-    "twin_delete": (None, [HANDLE]),
-    "twin_now": (LONG, [HANDLE]),
-    "twin_run": (None, [HANDLE, LONG]),
-    "twin_run_until_words": (WHOLE, [HANDLE, WHOLE, LONG]),
-    "twin_send_words": (None, [HANDLE, HANDLE, WHOLE, HANDLE, WHOLE, WHOLE]),
-    "twin_send_levels": (None, [HANDLE, HANDLE, WHOLE, REAL]),
-    "twin_receive_words": (WHOLE, [HANDLE, HANDLE, WHOLE]),
-    "twin_host_bit_time": (None, [HANDLE, REAL]),
-    "twin_flip_reply": (None, [HANDLE, HANDLE, WHOLE]),
-    "twin_bus_spikes": (None, [HANDLE, REAL, REAL, REAL]),
-    "twin_cut": (None, [HANDLE, WHOLE, WHOLE]),
-    "twin_bus_state": (None, [HANDLE, HANDLE]),
-    "twin_estop": (None, [HANDLE, WHOLE, WHOLE]),
-    "twin_fit_probe": (None, [HANDLE, WHOLE, HANDLE, REAL]),
-    "twin_machine": (HANDLE, [HANDLE, WHOLE]),
-    "twin_attach_devices": (HANDLE, [HANDLE, WHOLE, HANDLE, ctypes.c_uint, LONG, WHOLE]),
-    "twin_join_peers": (HANDLE, [HANDLE, WHOLE, WHOLE, LONG, REAL]),
-    "twin_join_link": (None, [HANDLE, WHOLE, LONG, REAL, HANDLE]),
-    "twin_power": (None, [HANDLE, WHOLE, WHOLE]),
-    "twin_register": (ctypes.c_char_p, [WHOLE, HANDLE]),
-    "twin_flip_at": (None, [HANDLE, LONG, WHOLE, WHOLE, WHOLE, WHOLE]),
-    "twin_flipped": (WHOLE, [HANDLE]),
-    "twin_digest": (LONG, [HANDLE, WHOLE]),
-    "frame_bench_new": (HANDLE, [WHOLE, HANDLE, WHOLE, REAL]),
-    "frame_bench_delete": (None, [HANDLE]),
-    "frame_bench_idle": (None, [HANDLE, LONG]),
-    "frame_bench_now": (LONG, [HANDLE]),
-    "frame_bench_exchange": (WHOLE, [HANDLE, HANDLE, WHOLE, WHOLE, WHOLE, WHOLE, HANDLE, WHOLE]),
-}
 
 
 @dataclass(frozen=True)
@@ -183,34 +130,6 @@ class LinkLine:
         self.send(data)
         self.twin.run(seconds)
         return self.take()
-
-
-def library(
-    clk_hz: int,
-    axes: int,
-    words: Sequence[int],
-    node: Mapping[str, int | str] | None = None,
-    netlist: str | None = None,
-) -> ctypes.CDLL:
-    """The library of a build, with its functions declared."""
-    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node, words, netlist)))
-    declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **DEVICES_FUNCTIONS, **PEER_FUNCTIONS})
-    return found
-
-
-def array(values: Any, dtype: Any) -> numpy.typing.NDArray[Any]:
-    """The values as a contiguous array."""
-    return numpy.ascontiguousarray(values, dtype=dtype)
-
-
-def memory_image(found: ctypes.CDLL, words: Sequence[int]) -> numpy.typing.NDArray[Any]:
-    """The words of the firmware as an array; BuildError if they do not fit."""
-    image = array(words, numpy.uint32)
-    if len(image) > found.twin_memory_words():
-        raise build.BuildError(
-            f"the firmware has {len(image)} words, the node's memory {found.twin_memory_words()}"
-        )
-    return image
 
 
 class Twin:
@@ -613,127 +532,6 @@ class Twin:
     def take_trace(self, axis: int = 0) -> Trace:
         """{name: array} of what was recorded since the previous call."""
         return self.machine(axis).take_trace()
-
-
-class TwinTransport(Transport):
-    """The transport of the host package over a twin; time passes only as far as needed."""
-
-    time_is_stopped = handshake = True
-
-    def __init__(self, twin: Twin) -> None:
-        self.twin, self.character_s, self.addresses = twin, CELLS / twin.baud, twin.addresses
-
-    def send(self, words: Sequence[int]) -> None:
-        """Send words of nine bits."""
-        self.twin.run(TURNAROUND_CELLS / self.twin.baud)
-        self.twin.send_words(list(words))
-        self.twin.run(len(words) * self.character_s)
-
-    def receive(self, count: int, timeout_s: float) -> list[int]:
-        """At most `count` words; fewer when timeout_s of simulated time has passed."""
-        self.twin.run_until_words(count, timeout_s)
-        return self.twin.receive_words(count) if count else []
-
-    def now(self) -> float:
-        """Simulated time in s."""
-        return self.twin.time()
-
-    def wait(self, seconds: float) -> None:
-        """Let simulated time pass."""
-        self.twin.run(seconds)
-
-    def reaches(self, address: int) -> bool:
-        """Whether this address can be called: all can."""
-        return True
-
-    def speed(self) -> float | None:
-        """None: there is no server that could say how fast the twin runs."""
-        return None
-
-    def set_baud(self, baud: float) -> None:
-        """Change the baud rate of the host."""
-        self.twin.set_host_baud(baud)
-        self.character_s = CELLS / baud
-
-    def send_break(self) -> None:
-        """Hold the bus low for BREAK_S."""
-        self.twin.send_levels([0], BREAK_S)
-        self.twin.run(BREAK_S + 2 * self.character_s)
-
-    def close(self) -> None:
-        """Free the twin."""
-        self.twin.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-
-def cells_of(words: Sequence[int], gap_cells: int = 0) -> list[int]:
-    """Levels of 9-bit words on the bus, one a bit cell."""
-    levels: list[int] = []
-    for n, word in enumerate(words):
-        levels += [1] * (gap_cells if n else 0) + [0, *(word >> bit & 1 for bit in range(9)), 1]
-    return levels
-
-
-class FrameBench:
-    """One node without a machine, with a slow clock: 16 cycles a bit, at the baud rate of the
-    firmware. It is for 10^5 damaged frames. One with another clk_hz (whole kHz) is another build.
-
-    exchange(levels) puts bit cells on the line as they are and returns the words that the node
-    answered."""
-
-    def __init__(
-        self,
-        address: int = 1,
-        clk_hz: int = 1_840_000,
-        baud: float = BAUD,
-        firmware: Sequence[int] | None = None,
-    ) -> None:
-        self.handle: int | None = None
-        words = build.firmware(axes=1) if firmware is None else firmware
-        self.library, self.clk_hz = library(clk_hz, 1, words, NODE), clk_hz
-        image = memory_image(self.library, words)
-        self.handle = self.library.frame_bench_new(
-            address, image.ctypes.data, len(image), clk_hz / baud
-        )
-        self.words = numpy.empty(256, dtype=numpy.uint16)
-
-    def __del__(self) -> None:
-        if self.handle:
-            self.library.frame_bench_delete(self.handle)
-        self.handle = None
-
-    def exchange(
-        self, levels: Any, enough: int = 256, quiet_cells: int = 100, most_cells: int = 2000
-    ) -> list[int]:
-        """Returns when `enough` words are there, or the line was quiet for quiet_cells after the
-        last level or the answer; at
-        the latest after most_cells. A node takes up to 60 cells to answer a request, at a low
-        clock."""
-        sent = array(levels, numpy.uint8)
-        count = self.library.frame_bench_exchange(
-            self.handle,
-            sent.ctypes.data,
-            len(sent),
-            enough,
-            quiet_cells,
-            most_cells,
-            self.words.ctypes.data,
-            len(self.words),
-        )
-        return [int(word) for word in self.words[:count]]
-
-    def idle(self, cells: float, baud: float = BAUD) -> None:
-        """Let bit cells pass."""
-        self.library.frame_bench_idle(self.handle, round(cells * self.clk_hz / baud))
-
-    def time(self) -> float:
-        """Simulated seconds since reset."""
-        return float(self.library.frame_bench_now(self.handle) / self.clk_hz)
 
 
 def realtime_factor(
