@@ -123,7 +123,11 @@ class Language:
         """The reasons of the table. MutationError names one whose line does not exist."""
         entries = self.entries().get("reason", [])
         assert isinstance(entries, list)
-        found = [Reason(**entry) for entry in entries]
+        found = [
+            Reason(source, entry["line"], entry["mutant"], entry["why"])
+            for entry in entries
+            for source in entry["sources"]
+        ]
         for reason in found:
             lines = self.path_of(reason.source).read_text().splitlines()
             if reason.line not in [line.strip() for line in lines]:

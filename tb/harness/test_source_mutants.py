@@ -152,7 +152,7 @@ def test_tests_must_pass_without_a_mutant(monkeypatch):
 def test_a_reason_for_a_line_that_does_not_exist_is_refused(language, source, tmp_path):
     table = tmp_path / "reasons.toml"
     table.write_text(
-        f'[[reason]]\nsource = "{source}"\nline = "no such line"\nmutant = "*"\nwhy = "x"\n'
+        f'[[reason]]\nsources = ["{source}"]\nline = "no such line"\nmutant = "*"\nwhy = "x"\n'
     )
     with pytest.raises(MutationError, match="reasons.toml: .* has no line 'no such line'"):
         dataclasses.replace(language, table=table).reasons()
