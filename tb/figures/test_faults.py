@@ -5,12 +5,12 @@ model of signal_monitor gives, whatever the length of the blocks.
 
 import numpy as np
 
-from figures import faults
+from figures import faults, signal_faults
 from tb.bench import seed
 from tb.sense.signal_monitor import Settings, SignalMonitor
 
 LANES, SAMPLES = 5, 400
-SETTINGS = faults.advised(faults.AMPLITUDE, no_noise_samples=20)
+SETTINGS = faults.advised(signal_faults.AMPLITUDE, no_noise_samples=20)
 
 
 def course(source):
