@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 
-from boards.machine import LINKS, Axis, Machine
+from boards.machine import LINKS, SERIAL_LINK, SPI_LINK, Axis, Machine
 from figures import record
 from firmware.build import stem_of
 
@@ -26,12 +26,14 @@ PERIPHERALS = 3033  # all six (docs/peripherals.md); one alone was not measured
 LINK = 1296  # the real-time link
 ETHERNET = {"mii": 3377, "rgmii": 4921}  # core of LiteEth by the interface, as synthesised
 SET_POINTS, SET_POINTS_AXIS = 3827, 353  # of the first axis that has them, of each further one
-# Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of ten nodes)
+# Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of the builds)
 MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
 SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
 ETHERNET_RAM = 4  # core of LiteEth for RGMII and the link
+LINK_RAM = {SERIAL_LINK: 3, SPI_LINK: 2}  # lists of the link, and its frames on a serial line
+I2C_RAM, SET_POINTS_RAM = 2, 2  # commands and results; the queue of all axes
 SCOPE_STEP_WORDS, WAVEFORM = 512, 4  # recorder of ticks: words of a block; its excitation
 # On an iCE40: the node of four axes that count in logic cells, the LUT4 by which netlists of four
 # and three of them differ, and the queue of an axis' captures
@@ -79,6 +81,8 @@ def ecp5_block_ram(machine: Machine) -> int:
     if count("velocity"):
         found += MICROCODE + ENGINE * -(-len(axes) // ENGINE_AXES)
     found += ETHERNET_RAM * bool(machine.ip_address)
+    found += sum(ram for link, ram in LINK_RAM.items() if link in machine.peripherals)
+    found += I2C_RAM * ("i2c" in machine.peripherals) + SET_POINTS_RAM * (count("set_points") > 0)
     if machine.scope_words:
         found += -(-machine.scope_words // SCOPE_STEP_WORDS) + WAVEFORM
     return found
