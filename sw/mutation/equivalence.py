@@ -121,7 +121,7 @@ def compared(
         passes += [
             f"design -load pair; read_verilog -sv -formal {text}",
             "prep -flatten -top miter; memory_map; opt -full; async2sync; dffunmap",
-            "setundef -undriven -zero; setundef -init -zero; setundef -zero; techmap; opt_expr",
+            "setundef -undriven -zero; setundef -init -zero; techmap; opt_expr",
             f"setundef -zero; aigmap; opt_clean; write_aiger {text.with_suffix('.aig')}",
         ]
     script = folder / "miters.ys"

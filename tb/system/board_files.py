@@ -5,7 +5,8 @@ import os
 
 import pytest
 
-from boards import build
+from boards import board, build, machine
+from boards.fit import fit
 from boards.toml_file import Misfit
 from tb.bench import ROOT
 
@@ -30,6 +31,12 @@ def refusal(make):
         make()
     assert "\n" not in str(why.value)
     return str(why.value)
+
+
+def assert_refused(path, name, words):
+    """The machine of this file is refused for a board by its name, with the name of the file."""
+    found = refusal(lambda: fit(board.named(name), machine.load(path)))
+    assert found.startswith(f"{path}: ") and words in found
 
 
 def over_ethernet(folder, address="192.168.1.50", more=""):

@@ -19,6 +19,7 @@ from boards.toml_file import Misfit
 from figures import synthesis
 from figures.synthesis import SynthesisError
 from tb.bench import ROOT, seed
+from tb.system.board_files import ULX3S, edited, refusal
 
 FAKE = """#!{python}
 import sys
@@ -89,20 +90,10 @@ def test_further_options_of_the_loader_come_after_ours(loader, tmp_path):
 
 
 def test_the_offset_of_the_flash_is_that_of_the_board_file(loader, tmp_path):
-    path = tmp_path / "board.toml"
-    text = (ROOT / "constraints" / "ulx3s_85f" / "board.toml").read_text()
-    path.write_text(
-        text.replace('board = "ulx3s"\n', 'board = "ulx3s"\nflash_offset = 0x20_0000\n')
-    )
+    change = ('board = "ulx3s"\n', 'board = "ulx3s"\nflash_offset = 0x20_0000\n')
+    path = edited(tmp_path, ULX3S, change)
     one = fit(board.load(path), machine.named("mill"))
     assert load.options(one, True) == ["-b", "ulx3s", "-f", "-o", "2097152"]
-
-
-def refusal(make):
-    with pytest.raises(Misfit) as why:
-        make()
-    assert "\n" not in str(why.value)
-    return str(why.value)
 
 
 def test_without_a_bitstream_the_command_that_makes_it_is_named(loader, tmp_path):
@@ -200,10 +191,7 @@ def test_the_command_needs_a_board_and_a_machine(monkeypatch):
     ],
 )
 def test_a_wrong_loader_in_a_board_file_is_refused(old, new, words, tmp_path):
-    path = tmp_path / "board.toml"
-    text = (ROOT / "constraints" / "ulx3s_85f" / "board.toml").read_text()
-    assert text.count(old) == 1
-    path.write_text(text.replace(old, new))
+    path = edited(tmp_path, ULX3S, (old, new))
     assert refusal(lambda: board.load(path)) == f"{path}: {words}"
 
 

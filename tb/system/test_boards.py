@@ -13,7 +13,7 @@ from boards import board, build, generate, machine
 from boards.fit import fit
 from tb.bench import ROOT
 from tb.simulator import WAIVERS, package
-from tb.system.board_files import DESIGNS, MILL, edited, refusal
+from tb.system.board_files import DESIGNS, MILL, assert_refused, edited, refusal
 from twin.build import rtl_path
 
 
@@ -174,8 +174,7 @@ def test_peripherals_that_a_machine_does_not_have_are_idle():
 )
 def test_wrong_peripherals_are_refused(old, new, words, tmp_path):
     path = edited(tmp_path, "constraints/machines/s4_sub.toml", (old, new))
-    found = refusal(lambda: fit(board.named("ulx3s_25f"), machine.load(path)))
-    assert found.startswith(f"{path}: ") and words in found
+    assert_refused(path, "ulx3s_25f", words)
 
 
 def test_an_open_drain_line_needs_a_pin_for_both_directions(tmp_path):

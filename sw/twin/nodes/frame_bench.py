@@ -51,9 +51,9 @@ class FrameBench:
         self, levels: Any, enough: int = 256, quiet_cells: int = 100, most_cells: int = 2000
     ) -> list[int]:
         """Returns when `enough` words are there, or the line was quiet for quiet_cells after the
-        last level or the answer; at
-        the latest after most_cells. A node takes up to 60 cells to answer a request, at a low
-        clock."""
+        last level or the answer; at the latest after most_cells. A node takes up to 60 cells to
+        answer a request, at a low clock.
+        """
         sent = array(levels, numpy.uint8)
         count = self.library.frame_bench_exchange(
             self.handle,
