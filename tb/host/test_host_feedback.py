@@ -16,7 +16,7 @@ from moire.made.bus_tables import PARAMETERS
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.firmware.test_firmware_feedback import Signal
-from tb.host.test_host_command_line import Call, sentence
+from tb.host.call import Call, sentence
 from twin.compiled.tables import DEFINES, FAULT
 
 VELOCITY = PARAMETERS["velocity"].id

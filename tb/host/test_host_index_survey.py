@@ -21,7 +21,7 @@ from moire.errors import MotionFailed, NotSurveyed, OutOfRange
 from tb.bench import seed
 from tb.fakes.bus_node import BusNode
 from tb.fakes.index_axis import COUNT_NM, IndexAxis
-from tb.host.test_host_command_line import Call, sentence
+from tb.host.call import Call, sentence
 from twin.compiled.axis import Axis
 from twin.compiled.tables import PERIOD
 

@@ -23,7 +23,7 @@ from moire.made import bus_tables
 from tables import faults
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
-from tb.host.test_host_command_line import Call, sentence
+from tb.host.call import Call, sentence
 from twin.compiled.tables import FAULT, PERIOD
 
 TEXT = """\

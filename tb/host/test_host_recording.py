@@ -13,7 +13,7 @@ from moire.errors import BadFile
 from moire.made.registers import MAP_CRC
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
-from tb.host.test_host_command_line import Call, sentence
+from tb.host.call import Call, sentence
 from twin.compiled.tables import FAULT
 
 SINE = ("sine", "monitor", "harmonics", "recorder")  # what is built of sine and cosine

@@ -12,7 +12,7 @@ from moire.client.bus import Bus
 from moire.errors import OutOfRange, Refused
 from tb.fakes.bus_node import START, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
-from tb.host.test_host_command_line import Call, sentence
+from tb.host.call import Call, sentence
 from twin.compiled.axis import Axis
 from twin.compiled.tables import DEFINES, PERIOD, signed
 

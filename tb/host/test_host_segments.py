@@ -21,7 +21,7 @@ from moire.client.segments import (
 from moire.errors import BadFile, OutOfRange
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
-from tb.host.test_host_command_line import Call, sentence
+from tb.host.call import Call, sentence
 from twin.compiled.tables import PERIOD
 
 GOOD = ["0, 0", "1, 100", "2, -50", "3, 20"]

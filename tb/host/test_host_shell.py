@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`moire shell` at a terminal: editing, history, completion, the end by a signal. What it does
-without a terminal is tested in test_host_command_line.
+without a terminal is tested in test_host_command_files.
 """
 
 import os

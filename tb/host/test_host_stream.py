@@ -14,7 +14,7 @@ from moire.client.stream import Cubic, Point, read_points, set_points
 from moire.errors import BadFile, MotionFailed, OutOfRange, Refused
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
-from tb.host.test_host_command_line import Call, sentence
+from tb.host.call import Call, sentence
 from twin.compiled.tables import PERIOD
 
 PERIOD_NM = 800

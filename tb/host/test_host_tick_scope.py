@@ -18,7 +18,7 @@ from moire.errors import OutOfRange, Refused, UnitError
 from moire.made.bus_tables import FAULTS
 from tb.fakes.bus_node import START, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
-from tb.host.test_host_command_line import Call, sentence
+from tb.host.call import Call, sentence
 from twin.compiled.axis import Axis
 from twin.compiled.tables import DEFINES, PERIOD
 
