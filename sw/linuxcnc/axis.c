@@ -10,10 +10,12 @@ static const double VELOCITY_LSB = 1 << 24;  // per period and tick, of a set-po
 static const double OFFSET_S = 0.05;         // in which an offset at the start falls to 1/e
 static const double PATIENCE_S = 3;          // for the firmware to do what it was asked for
 static const double UNSEEN_S = 1;            // a homing that is not seen meanwhile was a short one
+static const double STOP_S = 1;              // longest controlled stop
 static const unsigned WARM_UP = 3;           // periods until the commands are those after homing
+static const unsigned ACCEPTED = 20;         // periods until the node has accepted a set-point
 
 enum { MODE_OFF, MODE_PREPARED, MODE_STREAMING, MODE_EXTRAPOLATING, MODE_ENDED };
-enum { ENDED_LATE = 3, ENDED_FAULT = 4 };
+enum { ENDED_LATE = 3 };
 
 static void enter(struct axis* axis, enum phase phase) {
     axis->phase = phase;
@@ -23,6 +25,11 @@ static void enter(struct axis* axis, enum phase phase) {
 
 static void fail(struct axis* axis, uint32_t cause) {
     enter(axis, FAILED);
+    *axis->pins.fault_cause = cause;
+}
+
+static void stop(struct axis* axis, uint32_t cause) {
+    enter(axis, STOPPING);
     *axis->pins.fault_cause = cause;
 }
 
@@ -74,17 +81,23 @@ static bool holds(const struct axis* axis) {
     return *axis->pins.enabled && axis->state == STATE_HOLDING;
 }
 
-// Homing: the node has its own methods; `index-enable` falls when it is homed and streams.
+// Homing: the node has its own methods; `index-enable` falls when it is homed and streams. Where
+// LinuxCNC aborts it, `index-enable` falls before.
 static void home(struct axis* axis, bool patient, double waited_s) {
     if (axis->state == STATE_HOMING || !*axis->pins.homed) axis->seen = true;
     bool done = axis->seen || waited_s > UNSEEN_S;
-    if (done && holds(axis) && *axis->pins.homed)
+    if (done && holds(axis) && *axis->pins.homed) {
         enter(axis, PREPARING);
-    else if (axis->seen && axis->state != STATE_HOMING && !*axis->pins.homed && !patient)
+        axis->seen = true;
+    } else if (axis->seen && axis->state != STATE_HOMING && !*axis->pins.homed && !patient) {
         fail(axis, CAUSE_HOMING_FAILED);
+    }
 }
 
 static void advance(struct axis* axis, double period_s) {
+    bool homes = axis->phase == RELEASING || axis->phase == HOMING ||
+                 (axis->phase == PREPARING && axis->seen);
+    if (homes && !*axis->pins.index_enable) enter(axis, ABORTING);
     double waited_s = axis->periods * period_s;
     bool patient = waited_s < PATIENCE_S;
     switch (axis->phase) {
@@ -103,6 +116,7 @@ static void advance(struct axis* axis, double period_s) {
             fail(axis, fault_cause(axis));
         break;
     case ENABLING:
+        axis->aborted = 0;
         if (holds(axis))
             enter(axis, *axis->pins.homed ? PREPARING : ENABLED);
         else if (!patient)
@@ -118,6 +132,13 @@ static void advance(struct axis* axis, double period_s) {
             fail(axis, CAUSE_HOMING_FAILED);
         break;
     case HOMING: home(axis, patient, waited_s); break;
+    case ABORTING:
+        axis->aborted = *axis->pins.position_cmd - *axis->pins.position;
+        if (waited_s > UNSEEN_S && holds(axis))
+            enter(axis, ENABLED);
+        else if (!patient)
+            fail(axis, CAUSE_HOMING_FAILED);
+        break;
     case PREPARING:
         if (axis->mode == MODE_PREPARED) {
             enter(axis, STARTING);
@@ -134,9 +155,15 @@ static void advance(struct axis* axis, double period_s) {
         break;
     case FOLLOWING:
         if (axis->mode == MODE_OFF || axis->mode == MODE_ENDED)
-            fail(axis, end_cause(axis));
+            stop(axis, end_cause(axis));
+        else if (axis->mode == MODE_PREPARED && axis->periods > ACCEPTED)
+            fail(axis, CAUSE_NOT_PREPARED);
         else if (*axis->pins.index_enable)
             enter(axis, RELEASING);
+        break;
+    case STOPPING:
+        if (!*axis->pins.enabled || axis->state == STATE_HOLDING || waited_s > STOP_S)
+            enter(axis, FAILED);
         break;
     case FAILED: break;
     }
@@ -146,19 +173,26 @@ static void advance(struct axis* axis, double period_s) {
 void axis_decide(struct axis* axis, uint32_t cause, double period_s) {
     struct axis_pins* pins = &axis->pins;
     bool on = axis->phase > RESETTING && axis->phase < FAILED;
-    if (!*pins->enable) {
+    if (axis->phase == STOPPING && cause != CAUSE_NOT_ALLOWED) {
+        advance(axis, period_s);
+    } else if (!*pins->enable) {
         if (axis->phase != OFF) enter(axis, OFF);
         axis->periods = 0;
     } else if (cause) {
-        if (axis->phase != FAILED) fail(axis, cause);
+        if (axis->phase == FOLLOWING && cause == CAUSE_LINK_LOST)
+            stop(axis, cause);
+        else if (axis->phase != FAILED)
+            fail(axis, cause);
     } else if (on && axis->faults) {
         fail(axis, fault_cause(axis));
     } else {
         advance(axis, period_s);
     }
-    *pins->fault = axis->phase == FAILED;
-    bool echoed = *pins->index_enable && axis->phase >= RELEASING && axis->phase <= PREPARING;
-    *pins->position_fb = echoed ? *pins->position_cmd : *pins->position;
+    *pins->fault = axis->phase >= STOPPING;
+    bool homes = *pins->index_enable && axis->phase >= RELEASING && axis->phase <= PREPARING;
+    *pins->position_fb = homes || axis->phase == ABORTING ? *pins->position_cmd
+                         : axis->phase == ENABLED         ? *pins->position + axis->aborted
+                                                          : *pins->position;
 }
 
 void axis_show_edge(struct axis* axis, int64_t position) {
@@ -188,7 +222,7 @@ struct axis_request axis_give(struct axis* axis, double period_s, double tick_s,
         .velocity = (int32_t)rounded(at.velocity * scale * tick_s * VELOCITY_LSB, 0x1p31 - 1),
         .enable = phase >= ENABLING && phase < FAILED,
         .home = phase == HOMING,
-        .stream = phase >= PREPARING && phase < FAILED,
+        .stream = phase >= PREPARING && phase < STOPPING,
         .reset = phase == RESETTING,
         .commit = phase == FOLLOWING,
     };

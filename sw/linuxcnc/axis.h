@@ -18,9 +18,11 @@ enum phase {
     ENABLED,    // the drive holds; the node does not know the zero of the axis
     RELEASING,  // the stream is being ended, to home again
     HOMING,     // the node homes
+    ABORTING,   // LinuxCNC has aborted the homing, the node stops
     PREPARING,  // a stream is being opened
     STARTING,   // commanded positions are taken, but not sent yet
     FOLLOWING,  // each packet has a set-point
+    STOPPING,   // no set-points any more; the drive stays on until the node has stopped the axis
     FAILED      // off, or about to be, until `enable` falls
 };
 
@@ -28,9 +30,10 @@ struct axis {
     struct axis_pins pins;
     enum phase phase;
     unsigned periods;    // since the phase began
-    bool seen;           // the node has begun to home
+    bool seen;           // the node has begun to home, or has just homed
     double commands[3];  // the last commanded positions, the newest one last
     double offset;       // added to them, it falls to 0 after the start
+    double aborted;      // after an aborted homing: added to the position that LinuxCNC sees
     double target;       // of the node, machine units
     uint32_t faults, first_fault, mode, ended, state;
 };
@@ -48,7 +51,8 @@ void axis_take(struct axis* axis, const uint32_t* words, unsigned axes, unsigned
                double tick_s);
 
 // One period of the axis, after axis_take if a reply has come. `cause`: why no drive may be on; 0:
-// it may. Sets the pins that answer LinuxCNC.
+// it may. Sets the pins that answer LinuxCNC. An axis in motion stops under control first if its
+// set-points do not reach the node.
 void axis_decide(struct axis* axis, uint32_t cause, double period_s);
 
 // The touch probe has met an edge at `position` (2^-16 period): LinuxCNC sees that for a period.

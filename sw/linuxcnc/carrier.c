@@ -67,7 +67,8 @@ static const char* open_spi(struct carrier* carrier, const char* device, unsigne
 }
 
 const char* carrier_open(struct carrier* carrier, const char* where) {
-    static const char* const forms = "write udp:HOST:PORT, serial:DEVICE:BAUD or spi:DEVICE:HZ";
+    static const char* const forms =
+        "write udp:HOST:PORT, serial:DEVICE:BAUD or spi:DEVICE:HZ, with a number at the end";
     char text[128], *last;
     *carrier = (struct carrier){.file = -1};
     if (strlen(where) >= sizeof text) return "the place of the node is too long";
@@ -76,13 +77,16 @@ const char* carrier_open(struct carrier* carrier, const char* where) {
     last = strrchr(text, ':');
     if (!first || first == last) return forms;
     *first = *last = 0;
+    char* end;
+    unsigned long number = strtoul(last + 1, &end, 10);
+    if (end == last + 1 || *end) return forms;
     const char* why = forms;
-    if (strcmp(text, "serial") == 0) {
+    if (strcmp(text, "serial") == 0 && number) {
         carrier->kind = CARRIER_SERIAL;
-        why = open_serial(carrier, first + 1, (unsigned)strtoul(last + 1, NULL, 10));
+        why = open_serial(carrier, first + 1, (unsigned)number);
     } else if (strcmp(text, "spi") == 0) {
         carrier->kind = CARRIER_SPI;
-        why = open_spi(carrier, first + 1, strtoul(last + 1, NULL, 10));
+        why = open_spi(carrier, first + 1, number);
     } else if (strcmp(text, "udp") == 0) {
         why = open_udp(carrier, first + 1, last + 1);
     }
@@ -95,9 +99,11 @@ void carrier_close(struct carrier* carrier) {
     carrier->file = -1;
 }
 
-// Consistent overhead byte stuffing: the packet has no zero, and a zero ends it.
+// Consistent overhead byte stuffing: the packet has no zero, and a zero ends it. The zero in front
+// ends whatever noise came before.
 static size_t stuffed(const uint8_t* packet, size_t length, uint8_t* out) {
-    size_t count_at = 0, end = 1;
+    size_t count_at = 1, end = 2;
+    out[0] = 0;
     for (size_t n = 0; n < length; n++) {
         if (packet[n]) out[end++] = packet[n];
         if (!packet[n] || end - count_at == GROUP + 1) {

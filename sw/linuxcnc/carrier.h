@@ -26,7 +26,7 @@ struct carrier {
     size_t reply;                          // bytes of a reply, set by the caller for SPI
     unsigned hz;                           // clock of the SPI
     size_t received;                       // bytes of a stuffed packet that is not complete
-    uint8_t stuffed[PACKET_LONGEST + 16];  // of a serial port: COBS adds a byte for each 254
+    uint8_t stuffed[PACKET_LONGEST + 16];  // of a serial port: COBS, and two zeros
     uint8_t transferred[SPI_LONGEST];      // of an SPI transfer, both ways; the reply is in it
 };
 

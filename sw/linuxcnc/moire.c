@@ -42,6 +42,7 @@ static const double NS = 1e-9, MS = 1e-3;
 static const int64_t SIMULATED_NS = 60000000000;  // longest wait for a simulated node
 static const int64_t CHECK_NS = 100000000;        // for a reply while the component is loaded
 enum { LEVEL_LOST = 2, LEVEL_GOOD = 1, LEVEL_LIMIT = 10 };
+enum { WATCHDOG_FAULT = 1 << (CAUSE_LINK_WATCHDOG - 1) };
 enum { INPUTS = 2 };       // pins for touch probes of an axis
 enum { LEAST_TICKS = 2 };  // from one set-point to the next
 
@@ -58,6 +59,7 @@ struct link {
     bool waiting;        // a request was sent
     bool was_reset;      // level of the pin `reset` in the last period
     bool started;        // the clock of the node is known
+    bool expired;        // the fault of the watchdog was latched in the last reply
     uint32_t last_tick;  // of the last set-points
     uint8_t refused[CAUSE_COUNTS];
     uint8_t packet[PACKET_LONGEST];
@@ -86,8 +88,10 @@ static bool receive(struct link* link) {
 static void count_refused(struct link* link) {
     for (unsigned n = 0; n < CAUSE_COUNTS; n++) {
         uint8_t more = (uint8_t)(link->reply.refused[n] - link->refused[n]);
-        if (link->started) *link->pins.requests_refused += more;
-        if (more) *link->pins.refused_cause = n + 1;
+        if (link->started && more) {
+            *link->pins.requests_refused += more;
+            *link->pins.refused_cause = n + 1;
+        }
         link->refused[n] = link->reply.refused[n];
     }
 }
@@ -118,7 +122,6 @@ static bool take_reply(struct link* link) {
     node_take_time(of, &link->reply);
     *pins->latency = (double)(carrier_now() - of->sent_at) / (double)NS_PER_MS;
     count_refused(link);
-    if (link->started && link->reply.expired) *pins->watchdog_has_bit = 1;
     const uint32_t* words = link->reply.values;
     node_clock_take(&link->clock, of->time, words[READ_NODE_TICK_COUNT.fixed], of->read_time);
     *pins->lateness = link->clock.late / of->clk_hz / MS;
@@ -129,11 +132,14 @@ static bool take_reply(struct link* link) {
     *pins->drift = node_clock_drift(&link->clock);
     take_captures(link, words);
     take_inputs(link, words);
-    bool ready = of->probes;
+    bool ready = of->probes, expired = false;
     for (unsigned n = 0; n < of->drives; n++) {
         axis_take(&link->axis[n], words, of->axes, n, tick_s);
         ready = ready && link->axis[n].phase == FOLLOWING;
+        expired = expired || link->axis[n].faults & WATCHDOG_FAULT;
     }
+    if (link->started && expired && !link->expired) *pins->watchdog_has_bit = 1;
+    link->expired = expired;
     for (unsigned n = of->drives; n < of->axes; n++)
         encoder_take(&link->encoder[n - of->drives], &link->latch[n], words, of->axes, n, tick_s);
     uint32_t state = words[list_word(READ_AXIS_STATE, of->axes, 0)];

@@ -9,6 +9,8 @@ position afterwards, and the error messages so far.
     patience SECONDS   how long each further step may take, on the clock of the computer
     on                 resets the emergency stop, switches the machine on
     home               homes all joints
+    homing             begins to home all joints
+    abort              aborts what is under way, as Esc does
     start PROGRAM      runs a G-code file
     line N             waits until the motion has reached line N of the program
     finish             waits until the program has ended
@@ -91,7 +93,7 @@ class Operator:
 
         return self.wait(tried)
 
-    def home(self):
+    def homing(self):
         self.command.mode(linuxcnc.MODE_MANUAL)
         self.command.wait_complete()
         if any(self.status.homed[n] for n in range(self.status.joints)):
@@ -100,6 +102,15 @@ class Operator:
             self.command.unhome(-1)
             self.command.wait_complete()
         self.command.home(-1)
+        return True
+
+    def abort(self):
+        self.command.abort()
+        self.command.wait_complete()
+        return True
+
+    def home(self):
+        self.homing()
         joints = range(self.status.joints)
         done = self.wait(lambda: not self.is_on() or all(self.status.homed[n] for n in joints))
         return done and self.finish()

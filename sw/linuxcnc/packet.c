@@ -47,7 +47,6 @@ bool packet_reply(const struct link_session* link, const uint8_t* packet, size_t
     uint64_t counts =
         word_at(packet, PACKET_REPLY_REFUSED) | (uint64_t)word_at(packet, PACKET_REPLY_STATE) << 32;
     for (unsigned n = 0; n < CAUSE_COUNTS; n++) reply->refused[n] = (uint8_t)(counts >> 8 * n);
-    reply->expired = counts >> 8 * CAUSE_COUNTS & 1;
     for (unsigned n = 0; n < link->reads; n++)
         reply->values[n] = word_at(packet, PACKET_REPLY_WORDS + n);
     reply->spare = word_at(packet, PACKET_REPLY_WORDS + link->reads + PACKET_REPLY_END_SPARE_VALUE);

@@ -24,7 +24,6 @@ struct link_session {
 struct link_reply {
     uint32_t time;  // of the node in cycles, before the first register was read
     uint8_t refused[CAUSE_COUNTS];
-    bool expired;  // the watchdog of the link
     uint32_t spare;
     uint32_t values[PACKET_MOST_VALUES];
 };

@@ -7,6 +7,7 @@ MACHINE is a machine of constraints/machines, or a .toml file. docs/linuxcnc.md 
 [linuxcnc] and [axis.linuxcnc] of a machine file.
 """
 
+import math
 import random
 import sys
 from collections.abc import Mapping, Sequence
@@ -18,8 +19,11 @@ import jinja2
 
 from boards import machine as machines
 from boards.toml_file import Misfit, Table, read
-from linuxcnc_config.set_up import LONGEST_SESSION
-from moire.client.link import MOST_LEAD
+from linuxcnc_config.lists import READS, WRITES
+from linuxcnc_config.set_up import LATE_S, LONGEST_SESSION
+from moire.bus.cobs import sealed
+from moire.client.link import MOST_LEAD, places
+from moire.made import link_tables as layout
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 LETTERS = "XYZABCUVW"
@@ -27,6 +31,12 @@ ROTARY = "ABC"
 LEAST_DELAY_MS = 4.0  # a set-point is sent when the next one is known, 8 servo ticks ahead
 MARGIN = 2.0  # of the following error that LinuxCNC sees, over the one of the delay
 SERVO_MS = 1.0
+MOST_DELAY_MS = 15 * SERVO_MS  # a set-point is a piece, and the node queues 16 of them
+# a controlled stop with limited jerk that just reaches its acceleration takes twice as long as one
+# without
+STOP = 2.0
+LONGEST_WATCHDOG_MS = 1000
+BITS = {"serial": 10, "spi": 8}  # of a byte on the line
 CARRIERS = {"udp": "udp:HOST:PORT", "serial": "serial:DEVICE:BAUD", "spi": "spi:DEVICE:HZ"}
 
 
@@ -104,13 +114,29 @@ class Configuration:
         """
         shift = 1 if self.gantries else 0  # there is no -0
         both = {number for pair in self.gantries for number in pair}
-        found = [axis.sequence + shift for axis in self.axes]
+        ranks = sorted({axis.sequence for axis in self.axes})  # LinuxCNC ends at a gap
+        found = [ranks.index(axis.sequence) + shift for axis in self.axes]
         return [-sequence if n in both else sequence for n, sequence in enumerate(found)]
 
     @property
     def behind_ms(self) -> float:
         """How much later than commanded an axis is at a position, seen from LinuxCNC."""
         return self.delay_ms + 2 * self.period_ns * 1e-6 + 1e-3 * (self.capture_us or 0)
+
+    @property
+    def baud(self) -> str:
+        """The baud rate of a serial link; empty for another carrier."""
+        kind, *_, rate = self.node.split(":")
+        return rate if kind == "serial" else ""
+
+    @property
+    def watchdog_ms(self) -> int:
+        """The silence after which the node switches its drives off: by then its axes have played
+        the last set-points, gone on for LATE_S and stopped under control, unless that takes longer
+        than LONGEST_WATCHDOG_MS.
+        """
+        stop_s = STOP * max(axis.velocity / axis.acceleration for axis in self.axes)
+        return min(round(self.delay_ms + 1e3 * (LATE_S + stop_s)), LONGEST_WATCHDOG_MS)
 
 
 def backlash_of(row: Table, table: Table) -> tuple[float, float]:
@@ -175,6 +201,8 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     if sensor not in ("table", "motor"):
         raise table.misfit(f"sensor {sensor!r} is none of table, motor")
     sequence = table.take("home_sequence", int, number)
+    if sequence < 0:
+        raise table.misfit(f"home_sequence {sequence} must not be below 0")
     table.close()
     following = values["velocity"] * behind_ms * 1e-3 * MARGIN
     return Joint(
@@ -216,6 +244,40 @@ def capture_of(table: Table, has_pll: bool) -> float | None:
     return capture
 
 
+def exchange_bits(kind: str, axes: int) -> tuple[int, float]:
+    """A request and its reply for a node of so many axes: the bits on a line of one of the kinds in
+    BITS, and the seconds for which the node plays the request.
+    """
+    words = (
+        layout.FRAME_WORDS + len(places(WRITES, axes)),
+        layout.REPLY_FRAME_WORDS + len(places(READS, axes)),
+    )
+    packets = [b"\1" * 4 * count for count in words]
+    played_ns = layout.SPI_TURNROUND_NS + layout.SPI_TURNROUND_BYTE_NS * len(b"".join(packets))
+    frames = [sealed(packet) if kind == "serial" else packet for packet in packets]
+    return BITS[kind] * len(b"".join(frames)), 1e-9 * played_ns
+
+
+def node_of(table: Table, axes: int) -> str:
+    """The key node of [linuxcnc]; a line must be fast enough for an exchange in each period."""
+    node = table.take("node", str)
+    kind, _, rest = node.partition(":")
+    rate = rest.rpartition(":")[2]
+    if kind not in CARRIERS or ":" not in rest or not rate.isdecimal() or int(rate) == 0:
+        forms = ", ".join(CARRIERS.values())
+        raise table.misfit(f"node {node!r}: write {forms}, with a number at the end")
+    if kind in BITS:
+        bits, played_s = exchange_bits(kind, axes)
+        least = math.ceil(bits / (1e-3 * SERVO_MS - played_s))
+        if int(rate) < least:
+            unit = "baud" if kind == "serial" else "Hz"
+            raise table.misfit(
+                f"node {node!r}: the packets of {axes} axes need {least} {unit} at least to fit "
+                f"into {SERVO_MS:g} ms"
+            )
+    return node
+
+
 def load(name: str) -> Configuration:
     """The configuration of a machine; Misfit, one line, if its file does not describe one."""
     machine = machines.named(name)
@@ -224,12 +286,13 @@ def load(name: str) -> Configuration:
     if not any(axis.drives for axis in machine.axes):
         raise file.misfit("no axis has a drive: LinuxCNC has nothing to move")
     table = file.table("linuxcnc", True)
-    bus, node = table.take("bus", str), table.take("node", str)
-    if len(node.split(":")) < 3 or node.split(":")[0] not in CARRIERS:
-        raise table.misfit(f"node {node!r}: write {', '.join(CARRIERS.values())}")
+    bus, node = table.take("bus", str), node_of(table, len(machine.axes))
     delay = table.take("delay_ms", float, 5.0)
-    if delay < LEAST_DELAY_MS:
-        raise table.misfit(f"delay_ms {delay:g}: a set-point needs {LEAST_DELAY_MS:g} at least")
+    if not LEAST_DELAY_MS <= delay <= MOST_DELAY_MS:
+        raise table.misfit(
+            f"delay_ms {delay:g}: a set-point needs {LEAST_DELAY_MS:g} at least, and the node "
+            f"queues those of {MOST_DELAY_MS:g} at most"
+        )
     capture = capture_of(table, machine.link_pll)
     table.close()
     behind = delay + 2 * SERVO_MS + 1e-3 * (capture or 0)
@@ -278,6 +341,8 @@ def texts(found: Configuration) -> dict[str, str]:
         **{key: getattr(found, key) for key in Configuration.__dataclass_fields__},
         "session": found.session or random.SystemRandom().randint(1, LONGEST_SESSION),
         "behind_ms": found.behind_ms,
+        "baud": found.baud,
+        "watchdog_ms": found.watchdog_ms,
         "node_axes": len(found.axes) + (found.spindle is not None),
         "letters": "".join(axis.letter for axis in found.axes),
         "gantries": found.gantries,

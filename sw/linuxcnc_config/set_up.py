@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sets the real-time link of a node up for the driver, over the bus: which registers each packet
-carries, the session, the watchdog. The made HAL file runs it before it loads the driver.
+carries, the session, the rate of a serial line, the watchdog, and what the axes do without
+set-points. The made HAL file runs it before it loads the driver.
 
     python -m linuxcnc_config.set_up --port /dev/ttyUSB0 --address 1 --axes 3 --session 4711
 """
@@ -18,8 +19,11 @@ from moire.client.link import Captures, ProcessData
 from moire.client.node import Node
 from moire.errors import MoireError
 
-WATCHDOG_S = 0.05
+WATCHDOG_S = 0.2
+LATE_S = 5e-3  # for which an axis goes on without set-points, until it stops
 LONGEST_SESSION = (1 << 24) - 1
+CYCLE = 16  # a cycle of the node in the register link.bit_time, which has 20 bits
+LEAST_BIT, LONGEST_BIT = 4 * CYCLE, (1 << 20) - 1
 
 
 class Unfit(Exception):
@@ -41,6 +45,21 @@ class Backlash(NamedTuple):
         return int(number), cls(length, velocity, hysteresis, {"motor": True, "table": False}[side])
 
 
+def bit_time_of(node: Node, baud: int) -> int:
+    """The value of link.bit_time for a baud rate; Unfit if the node cannot have it. From 4 cycles a
+    bit on the rounding is below 1 %, which a UART tolerates.
+    """
+    clk_hz = node.read_named("node.clk_hz")["value"]
+    bit_time = round(CYCLE * clk_hz / baud)
+    if not LEAST_BIT <= bit_time <= LONGEST_BIT:
+        raise Unfit(
+            f"a bit of {baud} baud takes {clk_hz / baud:.2f} cycles of the node, which has "
+            f"{1e-6 * clk_hz:g} MHz: choose from {CYCLE * clk_hz // LONGEST_BIT + 1} to "
+            f"{CYCLE * clk_hz // LEAST_BIT} baud"
+        )
+    return bit_time
+
+
 def set_up(
     node: Node,
     axes: int,
@@ -53,7 +72,7 @@ def set_up(
 ) -> None:
     """Sets the link of a node up and switches it on; Unfit if it has none, has another number of
     axes, or serves another host, unless it is to be taken from that by `force`. `backlash` is that
-    of axes by their numbers. `captures`: when the node reads what it replies.
+    of axes by their numbers, the others have none. `captures`: when the node reads what it replies.
     """
     state = node.read_named("link.state")
     if not state["built"]:
@@ -63,8 +82,13 @@ def set_up(
         raise Unfit(f"the node has {found} axes, the configuration has {axes}")
     if state["on"] and not state["expired"] and not force:
         raise Unfit(f"another host runs the node, in session {state['session']}")
-    for number, one in backlash.items():
-        Axis(node, number).set_backlash(*one)
+    for number in range(axes):
+        if number in backlash:
+            Axis(node, number).set_backlash(*backlash[number])
+        elif node.read_named("axis.built", number)["backlash"]:
+            node.write_named("feedback.backlash", number, value=0)
+    clk_hz, tick = (node.read_named(f"node.{name}")["value"] for name in ("clk_hz", "tick_period"))
+    node.write_named("node.late_limit", value=round(LATE_S * clk_hz / tick))
     ProcessData(WRITES, READS).set_up(
         node, bit_time, watchdog_s, session=session, captures=captures
     )
@@ -79,6 +103,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--address", type=int, default=1, help="of the node on the bus")
     parser.add_argument("--axes", type=int, required=True, help="axes of the configuration")
     parser.add_argument("--session", type=int, required=True, help=f"1 to {LONGEST_SESSION}")
+    parser.add_argument("--baud", type=int, help="of a serial link; without, as the node has it")
+    parser.add_argument(
+        "--watchdog",
+        type=int,
+        default=round(1e3 * WATCHDOG_S),
+        metavar="MS",
+        help="milliseconds without a packet after which the node switches its drives off "
+        "(default %(default)s)",
+    )
     parser.add_argument("--force", action="store_true", help="take the node from another host")
     parser.add_argument(
         "--backlash",
@@ -95,6 +128,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "period of the packets in microseconds: 200:1000; without, it reads them with the packet",
     )
     options = parser.parse_args(arguments)
+    if options.baud is not None and options.baud < 1:
+        parser.error("--baud must be above 0")
     captures = None
     if options.capture is not None:
         try:
@@ -113,6 +148,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 node,
                 options.axes,
                 options.session,
+                bit_time=None if options.baud is None else bit_time_of(node, options.baud),
+                watchdog_s=1e-3 * options.watchdog,
                 force=options.force,
                 backlash=backlash,
                 captures=captures,

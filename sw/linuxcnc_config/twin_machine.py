@@ -19,7 +19,7 @@ from experiments.s2_stage import CLK_HZ, Scale
 from experiments.s2_stage import NODE as STEPPERS
 from linuxcnc_config.generate import SERVO_MS, Configuration, Joint, Spindle, load
 from linuxcnc_config.programs import REST, SURFACE, Points, Surface
-from linuxcnc_config.set_up import set_up
+from linuxcnc_config.set_up import Backlash, set_up
 from moire.analysis.tune import COEFFICIENT, notch
 from moire.bus.link_gateway import LinkGateway
 from moire.client.bus import Bus
@@ -65,7 +65,7 @@ class Plant:
     image: str
     parameters: Mapping[str, int]  # of rtl/node.sv
     settings: Mapping[str, Value] = field(default_factory=dict)  # parameters of each axis
-    backlash: tuple[Value, Value, Value] | None = None  # as in Axis.set_backlash
+    backlash: Backlash | None = None
     surface: Surface | None = None  # under a touch probe, in mm from where the model has its zeros
     spindle: Axis | None = None  # the axis after those with a drive
     spindle_settings: Mapping[str, Value] = field(default_factory=dict)
@@ -79,7 +79,7 @@ MILL = Plant(
     "steps_stream",
     {**STEPPERS, "HAS_BACKLASH": ALL_AXES},
     {**SCALE.settings(), "home_offset": 0, "travel_low": "-2mm", "travel_high": "150mm"},
-    (f"{SCREW.backlash}um", f"{SCREW.take_up}mm/s", f"{SCREW.hysteresis}um"),
+    Backlash(f"{SCREW.backlash}um", f"{SCREW.take_up}mm/s", f"{SCREW.hysteresis}um", False),
     SURFACE,
 )
 DRIVEN = 0b11  # axes of the lathe
@@ -156,13 +156,18 @@ class TwinMachine:
             for name, value in plant.settings.items():
                 axis.set_parameter(name, value)
             axis.set_parameter("watchdog_time", 0)  # of the bus, which is silent
-            if plant.backlash:
-                axis.set_backlash(*plant.backlash)
         for name, value in plant.spindle_settings.items():
             bus.axis(1, self.axes).set_parameter(name, value)
         self.node = bus.node(1)
         self.line = self.twin.link()
-        set_up(self.node, len(axes), SESSION, bit_time=self.line.bit_time, watchdog_s=0)
+        set_up(
+            self.node,
+            len(axes),
+            SESSION,
+            bit_time=self.line.bit_time,
+            watchdog_s=0,
+            backlash=dict.fromkeys(range(self.axes), plant.backlash) if plant.backlash else {},
+        )
         self.path: list[tuple[float, ...]] = []  # mm of each axis at each part
         self.turns: list[float] = []  # of the spindle
         self.gateway = LinkGateway(self, PERIOD_S)

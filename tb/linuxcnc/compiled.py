@@ -2,6 +2,7 @@
 """The parts of the driver for LinuxCNC that need no LinuxCNC, compiled for this computer."""
 
 import ctypes
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -11,13 +12,23 @@ from linuxcnc_config.headless import SOURCES
 from moire.bus.link_spi import MOST_HZ as SPI_MOST_HZ
 from moire.bus.link_spi import turnround_bytes
 from moire.made import link_tables as layout
+from tables.linuxcnc import SOURCE, identifier
 from twin.compiled.host_library import host_library
 
 ZLIB = Path("/usr/include/zlib.h")
 LONGEST = 4 * layout.LONGEST_WORDS
 OPTIONS = ["-std=gnu11", "-D_GNU_SOURCE", "-Wl,--no-as-needed", "-lz", "-lm"]
 OPTIONS += ["-Wl,--wrap=open", "-Wl,--wrap=ioctl"]
-NAMES = ("packet", "carrier", "node", "node_clock", "latch", "probe")
+NAMES = ("packet", "carrier", "node", "node_clock", "latch", "probe", "axis")
+TABLE = tomllib.loads(SOURCE.read_text(encoding="utf-8"))
+TYPES = {  # of hal.h
+    "bit": ctypes.c_bool,
+    "float": ctypes.c_double,
+    "s32": ctypes.c_int32,
+    "u32": ctypes.c_uint32,
+}
+AXIS_PINS = {identifier(name): TYPES[kind] for name, (kind, *_) in TABLE["axis"].items()}
+CAUSES = {name: number for name, (number, _) in TABLE["cause"].items()}
 
 
 class Session(ctypes.Structure):
@@ -32,7 +43,6 @@ class Reply(ctypes.Structure):
     _fields_ = [
         ("time", ctypes.c_uint32),
         ("refused", ctypes.c_uint8 * len(layout.CAUSES)),
-        ("expired", ctypes.c_bool),
         ("spare", ctypes.c_uint32),
         ("values", ctypes.c_uint32 * layout.MOST_VALUES),
     ]
@@ -111,6 +121,35 @@ class Node(ctypes.Structure):
     ]
 
 
+class AxisPins(ctypes.Structure):
+    """struct axis_pins"""
+
+    _fields_ = [(name, ctypes.POINTER(kind)) for name, kind in AXIS_PINS.items()]
+
+
+class Axis(ctypes.Structure):
+    """struct axis"""
+
+    _fields_ = [
+        ("pins", AxisPins),
+        *((name, ctypes.c_uint) for name in ("phase", "periods")),
+        ("seen", ctypes.c_bool),
+        ("commands", ctypes.c_double * 3),
+        *((name, ctypes.c_double) for name in ("offset", "aborted", "target")),
+        *((name, ctypes.c_uint32) for name in ("faults", "first_fault", "mode", "ended", "state")),
+    ]
+
+
+class AxisRequest(ctypes.Structure):
+    """struct axis_request"""
+
+    _fields_ = [
+        ("position", ctypes.c_int64),
+        ("velocity", ctypes.c_int32),
+        *((name, ctypes.c_bool) for name in ("enable", "home", "stream", "reset", "commit")),
+    ]
+
+
 Transfer = ctypes.CFUNCTYPE(
     ctypes.c_bool, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32
 )
@@ -119,12 +158,14 @@ Transfer = ctypes.CFUNCTYPE(
 @cache
 def driver() -> ctypes.CDLL:
     """The library; the test is skipped by name where zlib's header is not installed. Its SPI
-    devices are those of spidev.c, where `spidev_set(FILE, Transfer)` puts one.
+    devices are those of spidev.c, where `spidev_set(FILE, Transfer)` puts one. The types of its
+    pins are those of hal.h beside this file.
     """
     if not ZLIB.exists():
         pytest.skip("zlib1g-dev is not installed: make linuxcnc")
-    sources = [*(SOURCES / f"{name}.c" for name in NAMES), Path(__file__).with_name("spidev.c")]
-    found = host_library("linuxcnc", sources, [*OPTIONS, f"-I{SOURCES}"])
+    folder = Path(__file__).parent
+    sources = [*(SOURCES / f"{name}.c" for name in NAMES), folder / "spidev.c"]
+    found = host_library("linuxcnc", sources, [*OPTIONS, f"-I{SOURCES}", f"-I{folder}"])
     found.packet_request.restype = ctypes.c_size_t
     found.packet_reply.restype = ctypes.c_bool
     found.packet_reply_length.restype = ctypes.c_size_t
@@ -136,4 +177,5 @@ def driver() -> ctypes.CDLL:
     found.carrier_send.restype = ctypes.c_bool
     found.carrier_receive.restype = ctypes.c_size_t
     found.carrier_now.restype = ctypes.c_int64
+    found.axis_give.restype = AxisRequest
     return found

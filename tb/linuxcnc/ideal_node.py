@@ -31,8 +31,9 @@ CAUSE = {name: code for code, (name, _) in BUS_CAUSES.items()}
 OFF, PREPARED, STREAMING, EXTRAPOLATING, ENDED = range(5)
 NOT_ENDED, RELEASED, STOPPED, LATE, BY_FAULT = range(5)
 LOST = b"?"  # instead of a reply
-WATCHDOG_S = 0.05
-LATE_TICKS = 400  # longest extrapolation
+SLOWING = 0.9  # of the velocity that is left after each tick of a controlled stop
+STILL = 1e-3  # periods per tick
+FARTHEST, PIECES = 255, 16  # ticks until a set-point, and set-points that wait
 INDEX, RISING, FALLING = 1, 8, 32  # sources of captures
 
 
@@ -114,18 +115,26 @@ class IdealAxis:
     sources: int = 0  # of captures
     captured: list[float] = field(default_factory=list)
     beside: float = 0.0  # of its target, in periods: a side of a gantry that does not follow
+    cuts: list[float] = field(default_factory=list)  # velocities at which the drive went off
+
+    def switch_off(self, state: str) -> None:
+        """The drive goes off."""
+        if self.enabled:
+            self.cuts.append(self.velocity)
+        self.enabled, self.state = False, STATE[state]
 
     def fault(self, name: str) -> None:
         """Latches a fault: the drive goes off."""
         self.first_fault = self.first_fault or FAULT[name]
         self.faults |= FAULT[name]
-        self.enabled, self.state = False, STATE["faulted"]
+        self.switch_off("faulted")
         if self.mode not in (OFF, ENDED):
             self.mode, self.ended = ENDED, BY_FAULT
 
     def obey(self, asked: dict[str, int], tick: int) -> None:
         """What the firmware does at each look at the requests."""
         rose = {name: asked[name] and not self.requested[name] for name in asked}
+        fell = {name: self.requested[name] and not asked[name] for name in asked}
         self.requested = asked
         if rose["reset_faults"] and not self.enabled:
             self.faults = self.first_fault = 0
@@ -133,17 +142,22 @@ class IdealAxis:
         if rose["enable"] and not self.faults:
             self.enabled, self.state = True, STATE["holding"]
         if not asked["enable"] and self.enabled:
-            self.enabled, self.state = False, STATE["off"]
+            self.switch_off("off")
             if self.mode not in (OFF, ENDED):
                 self.mode, self.ended = ENDED, STOPPED
         if rose["home"] and self.state == STATE["holding"] and self.mode == OFF:
             self.homed, self.state, self.home_ticks = False, STATE["homing"], 800
+        if fell["home"] and self.state == STATE["homing"]:
+            self.state = STATE["stopping"]
         if rose["stream"] and self.state == STATE["holding"] and self.homed:
             self.mode, self.ended, self.queue = PREPARED, NOT_ENDED, []
+            self.state = STATE["prepared"]
             self.done = SetPoint(tick, self.position, 0)
             self.accepted = self.late = self.refused = self.extrapolated = 0
         if not asked["stream"]:
-            self.mode = OFF if self.mode in (OFF, PREPARED, ENDED, STREAMING) else self.mode
+            if self.mode in (PREPARED, STREAMING, EXTRAPOLATING):
+                self.state = STATE["stopping"]
+            self.mode = OFF
 
     def commit(self, point: SetPoint, tick: int) -> None:
         """Queues a set-point."""
@@ -151,13 +165,15 @@ class IdealAxis:
         last = self.queue[-1] if self.queue else None
         if self.mode not in (PREPARED, STREAMING, EXTRAPOLATING) or not complete:
             self.refused += 1
+        elif point.tick > tick + FARTHEST or len(self.queue) == PIECES:
+            self.refused += 1
         elif point.tick <= tick + 4 or (last and point.tick < last.tick + 2):
             self.late += 1
         else:
             self.accepted += 1
             if self.mode == PREPARED:
                 self.done = SetPoint(tick, self.position, 0)
-            self.mode = STREAMING
+            self.mode, self.state = STREAMING, STATE["moving"]
             self.queue.append(point)
 
     def capture(self, source: int, position: float) -> None:
@@ -165,7 +181,7 @@ class IdealAxis:
         if self.sources & source:
             self.captured.append(position)
 
-    def run(self, tick: int) -> None:
+    def run(self, tick: int, late_limit: int) -> None:
         """A servo tick."""
         before = self.position
         self.position += self.spin
@@ -187,8 +203,12 @@ class IdealAxis:
                     self.mode = EXTRAPOLATING
                     self.extrapolated += 1
                 self.position = self.done.position + self.done.velocity * (tick - self.done.tick)
-                if tick - self.done.tick > LATE_TICKS:
-                    self.mode, self.ended = ENDED, LATE
+                if tick - self.done.tick > late_limit:
+                    self.mode, self.ended, self.state = ENDED, LATE, STATE["stopping"]
+        elif self.state == STATE["stopping"]:
+            self.position += SLOWING * self.velocity if self.enabled else 0
+            if abs(self.velocity) < STILL:
+                self.state = STATE["holding"]
         self.velocity = self.position - before
 
 
@@ -219,7 +239,8 @@ class IdealNode:
         self.tick = 0
         self.estop = False
         self.pressed_at = self.heard_at = 0  # cycles
-        self.session, self.sequence = 0, 0
+        self.session, self.sequence, self.bit_time = 0, 0, 0
+        self.watchdog_s = 0.0  # of the link; 0: none
         self.lists: dict[int, int] = {}
         self.writes, self.reads, self.entry, self.drawn = 0, 0, 0, 0
         self.refused = [0] * len(layout.CAUSES)
@@ -351,10 +372,10 @@ class IdealNode:
                     axis.obey(self._asked(requests, n), self.tick)
             if self.expired:
                 for axis in [axis for axis in self.axes if axis.enabled]:
-                    axis.fault("bus_watchdog")
+                    axis.fault("link_watchdog")
             before = [axis.position for axis in self.axes]
             for axis in self.axes:
-                axis.run(self.tick)
+                axis.run(self.tick, self.words.get(address("node", "late_limit"), 0))
             self._touch(before)
             self.path.append((self.time / CLK_HZ, *(axis.position for axis in self.axes)))
         self.time = end
@@ -387,7 +408,7 @@ class IdealNode:
     @property
     def expired(self) -> bool:
         """Whether the watchdog of the link has expired."""
-        return self.time - self.heard_at > WATCHDOG_S * CLK_HZ
+        return 0 < self.watchdog_s * CLK_HZ < self.time - self.heard_at
 
     def stopped_for(self, seconds: float) -> bool:
         """Whether the emergency stop has been pressed for so long."""
@@ -428,7 +449,7 @@ class IdealNode:
     def restart(self) -> None:
         """The node loses its power and starts again."""
         self.session = self.sequence = self.time = self.tick = self.heard_at = 0
-        self.words, self.captured, self.period = {}, None, 0
+        self.words, self.captured, self.period, self.watchdog_s = {}, None, 0, 0.0
         self.refused = [0] * len(layout.CAUSES)
         for axis in self.axes:
             axis.__init__(position=axis.position, turn=axis.turn, spin=axis.spin)
@@ -437,7 +458,7 @@ class IdealNode:
         names = [name for name, _ in layout.CAUSES]
         self.refused[names.index(cause)] += 1
 
-    def write_named(self, name: str, **fields: int) -> None:
+    def write_named(self, name: str, axis: int = 0, **fields: int) -> None:
         """Writes a register as a client of the bus would: those of the link are the set-up."""
         if name == "link.lists":
             self.writes, self.reads = fields["writes"], fields["reads"]
@@ -454,16 +475,20 @@ class IdealNode:
         elif name == "link.enable":
             self.session, self.sequence = self.drawn * fields["value"], 0
             self.heard_at, self.captured = self.time, None
+        elif name == "link.watchdog_time":
+            self.watchdog_s = 1e-3 * fields["value"]
+        elif name == "link.bit_time":
+            self.bit_time = fields["value"]
+        elif not name.startswith("link."):
+            block, _, register = name.partition(".")
+            self.write(address(block, register, axis), fields["value"])
 
-    def read_named(self, name: str) -> dict[str, int]:
+    def read_named(self, name: str, axis: int = 0) -> dict[str, int]:
         """Reads a register as a client of the bus would."""
-        if name == "node.build":
-            return {"axes": len(self.axes)}
-        if name == "node.clk_hz":
-            return {"value": CLK_HZ}
-        if name == "link.pll_state":
-            return {"built": self.has_pll}
-        assert name == "link.state"
+        if name != "link.state":
+            block, _, register = name.partition(".")
+            known = [f for f in FIELDS if (f.block, f.register) == (block, register)]
+            return {f.field: f.value(self.read(known[0].address(axis))) for f in known}
         on = self.session != 0
         return {"built": 1, "on": on, "expired": on and self.expired, "session": self.session}
 

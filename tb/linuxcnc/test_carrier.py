@@ -14,7 +14,7 @@ from tb.bench import seed
 from tb.linuxcnc.compiled import LONGEST, Carrier, driver
 
 PATIENCE_NS = 2_000_000_000
-FORMS = "write udp:HOST:PORT, serial:DEVICE:BAUD or spi:DEVICE:HZ"
+FORMS = "write udp:HOST:PORT, serial:DEVICE:BAUD or spi:DEVICE:HZ, with a number at the end"
 
 
 @pytest.fixture
@@ -89,10 +89,10 @@ def test_a_serial_port_carries_cobs_packets(carrier):
         assert opened(carrier, f"serial:{os.ttyname(slave)}:3000000") is None
         for packet in packets(random.Random(seed())):
             assert send(carrier, packet)
-            got = b""
-            while not got.endswith(b"\0"):
+            got = os.read(master, 1)
+            while len(got) == 1 or not got.endswith(b"\0"):
                 got += os.read(master, 4096)
-            assert cobs.decode(got[:-1]) == packet
+            assert got[:1] == b"\0" and cobs.decode(got[1:-1]) == packet
             coded = cobs.encode(packet[::-1]) + b"\0"
             os.write(master, coded[:3])
             os.write(master, coded[3:])
@@ -124,6 +124,10 @@ def test_noise_on_a_serial_port_costs_only_the_packet_in_it(carrier):
     [
         ("tcp:localhost:5", FORMS),
         ("udp:localhost", FORMS),
+        ("serial:/dev/ttyUSB1:fast", FORMS),
+        ("serial:/dev/ttyUSB1:3M", FORMS),
+        ("serial:/dev/ttyUSB1:", FORMS),
+        ("serial:/dev/ttyUSB1:0", FORMS),
         ("udp:no.such.host.invalid:5", "the address of the node is unknown"),
         ("serial:/dev/no_such_port:115200", "the serial port cannot be opened"),
         ("serial:/dev/null:115200", "the device is no serial port"),

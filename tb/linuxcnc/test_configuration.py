@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The generator of configurations for LinuxCNC, and the set-up of a link."""
 
+import math
 import re
 from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 
+from boards.toml_file import ROOT
 from linuxcnc_config.__main__ import main
-from linuxcnc_config.generate import CARRIERS, Misfit, load, texts
+from linuxcnc_config.generate import CARRIERS, Misfit, exchange_bits, load, texts
 from linuxcnc_config.lists import READS, WRITES
-from linuxcnc_config.set_up import Backlash, Unfit, set_up
+from linuxcnc_config.set_up import Backlash, Unfit, bit_time_of, set_up
 from linuxcnc_config.set_up import main as set_up_program
 from moire.client.link import Captures, places
 from moire.errors import Refused
 from moire.made import link_tables as layout
-from tb.linuxcnc.ideal_node import CLK_HZ, IdealNode, address
+from tb.linuxcnc.ideal_node import CLK_HZ, IdealNode, address, placed
 
 MILL = """
 title = "mill"
@@ -49,7 +51,9 @@ def test_the_configuration_has_the_numbers_of_the_machine_file(tmp_path):
         assert f"\n{line}\n" in made["mill.ini"]
     assert "\nsetp moire.0.axis.0.scale 250\n" in made["mill.hal"]  # periods per mm
     assert re.search(
-        r"set_up --port /dev/ttyUSB0 --address 3 --axes 1 --session \d+", made["mill.hal"]
+        r"set_up --port /dev/ttyUSB0 --address 3 --axes 1 --session \d+ --baud 3000000 --watchdog "
+        r"210\n",
+        made["mill.hal"],
     )
     assert 'node="serial:/dev/ttyUSB1:3000000" axes=1 session=' in made["mill.hal"]
 
@@ -66,6 +70,96 @@ def test_the_backlash_of_a_machine_file_comes_to_the_set_up(tmp_path, monkeypatc
     monkeypatch.setattr("linuxcnc_config.set_up.Axis", axis)
     set_up(IdealNode(1), 1, 5, backlash={0: Backlash("2.5um", "8mm/s", "1um", True)})
     axis().set_backlash.assert_called_once_with("2.5um", "8mm/s", "1um", True)
+
+
+def test_an_axis_without_backlash_in_the_machine_file_has_none_in_the_node():
+    node = IdealNode(2)
+    for n, built in enumerate((1, 0)):
+        word = placed("axis", "built", drive=1, set_points=1, backlash=built)
+        node.names[address("axis", "built", n)] = lambda word=word: word
+        node.write(address("feedback", "backlash", n), 82)
+    set_up(node, 2, 5)
+    assert [node.read(address("feedback", "backlash", n)) for n in range(2)] == [0, 82]
+
+
+def test_a_carrier_that_is_no_serial_line_gets_no_baud_rate(tmp_path):
+    hal = texts(load(written(tmp_path, ("serial:/dev/ttyUSB1:3000000", "udp:10.0.0.2:27181"))))
+    assert "--baud" not in hal["mill.hal"]
+
+
+def test_the_set_up_writes_the_bit_time_of_a_baud_rate_at_the_clock_of_the_node():
+    node = IdealNode(1)
+    set_up(node, 1, 5, bit_time=bit_time_of(node, 115_200))
+    assert node.bit_time == round(16 * CLK_HZ / 115_200) == 333
+    assert bit_time_of(node, 600_000) == 4 * 16 and bit_time_of(node, 37) < 1 << 20
+    range_of_node = "which has 2.4 MHz: choose from 37 to 600000 baud"
+    for baud, cycles in ((3_000_000, "0.80"), (620_000, "3.87"), (30, "80000.00")):
+        words = f"a bit of {baud} baud takes {cycles} cycles of the node, {range_of_node}"
+        with pytest.raises(Unfit, match=re.escape(words)):
+            bit_time_of(node, baud)
+
+
+def test_the_axes_stop_under_control_before_the_watchdog_switches_their_drives_off(tmp_path):
+    node = IdealNode(1)
+    set_up(node, 1, 5)
+    assert node.read(address("node", "late_limit")) == 20 and node.watchdog_s == 0.2
+    for change, watchdog_ms in (
+        (("velocity = 50", "velocity = 50"), 5 + 5 + 200),
+        (("velocity = 50", "velocity = 20"), 5 + 5 + 80),
+        (("[linuxcnc]", "[linuxcnc]\ndelay_ms = 10.5"), 216),
+        (("acceleration = 500", "acceleration = 20"), 1000),
+    ):
+        assert load(written(tmp_path, change)).watchdog_ms == watchdog_ms
+
+
+def machine_of(tmp_path, node, axes):
+    """A machine file with so many axes at a node."""
+    found = written(tmp_path, ("serial:/dev/ttyUSB1:3000000", node))
+    axis = MILL[MILL.index("[[axis]]") :]
+    with Path(found).open("a") as file:
+        file.writelines(axis.replace('"X"', f'"{name}"') for name in "YZABCUV"[: axes - 1])
+    return found
+
+
+@pytest.mark.parametrize(
+    "node, axes",
+    [
+        ("serial:/dev/ttyUSB1:3000000", 3),
+        ("serial:/dev/ttyUSB1:3514245", 4),
+        ("spi:/dev/spidev0.0:12000000", 8),
+        ("udp:10.0.0.2:27181", 8),
+    ],
+)
+def test_a_line_that_is_fast_enough_for_the_packets_of_the_axes_is_taken(tmp_path, node, axes):
+    assert load(machine_of(tmp_path, node, axes)).node == node
+
+
+@pytest.mark.parametrize(
+    "node, axes, least",
+    [
+        ("serial:/dev/ttyUSB1:3000000", 4, "3514245 baud"),
+        ("serial:/dev/ttyUSB1:6000000", 8, "6355480 baud"),
+        ("spi:/dev/spidev0.0:5000000", 8, "5024568 Hz"),
+    ],
+)
+def test_a_line_too_slow_for_the_packets_of_the_axes_is_refused(tmp_path, node, axes, least):
+    words = f"the packets of {axes} axes need {least} at least to fit into 1 ms"
+    with pytest.raises(Misfit, match=words):
+        load(machine_of(tmp_path, node, axes))
+
+
+def test_the_page_has_the_bytes_and_the_times_of_an_exchange():
+    page = (ROOT / "docs" / "linuxcnc.md").read_text(encoding="utf-8")
+    rows = re.findall(r"  \| (\d) \| (\d+) \| (.*) \| ([\d ]+) \| (.*) ms \|", page)
+    assert len(rows) == 6
+    for axes, count, exchange, least, spi in rows:
+        bits, played_s = exchange_bits("serial", int(axes))
+        took_ms = 1e3 * (bits / 3e6 + played_s)
+        assert int(count) == bits / 10
+        assert exchange == (f"{took_ms:.2f} ms" if took_ms < 1 else "does not fit")
+        assert int(least.replace(" ", "")) == math.ceil(bits / (1e-3 - played_s))
+        bits, played_s = exchange_bits("spi", int(axes))
+        assert spi == f"{1e3 * (bits / 12e6 + played_s):.2f}"
 
 
 SPINDLE = """
@@ -114,7 +208,25 @@ def test_axes_beside_a_gantry_are_homed_in_the_order_of_their_numbers_without_a_
     found = written(tmp_path)
     second = MILL[MILL.index("[[axis]]") :].replace('"X"', '"Y"')
     Path(found).write_text(MILL + GANTRY + second)
-    assert re.findall(r"HOME_SEQUENCE = (\S+)", texts(load(found))["mill.ini"]) == ["-1", "-1", "2"]
+    assert homed_in(found) == ["-1", "-1", "2"]
+
+
+def homed_in(machine):
+    """HOME_SEQUENCE of the joints."""
+    return re.findall(r"HOME_SEQUENCE = (\S+)", texts(load(machine))["mill.ini"])
+
+
+def test_home_sequence_is_the_order_and_may_have_gaps(tmp_path):
+    """LinuxCNC's Home All ends at the first number without a joint."""
+    found = written(tmp_path)
+    axis = MILL[MILL.index("[[axis]]") :]
+    numbers = {"X": 5, "Y": 2, "Z": 5}
+    rows = [axis.replace('"X"', f'"{name}"') for name in numbers]
+    rows = [f"{row}home_sequence = {n}\n" for row, n in zip(rows, numbers.values())]
+    Path(found).write_text(MILL[: MILL.index("[[axis]]")] + "".join(rows))
+    assert homed_in(found) == ["1", "0", "1"]
+    Path(found).write_text(MILL[: MILL.index("[[axis]]")] + rows[0] + GANTRY + rows[1])
+    assert homed_in(found) == ["-2", "-2", "1"]
 
 
 @pytest.mark.parametrize(
@@ -208,7 +320,11 @@ def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(
         (("velocity = 50", "velocity = 50\nspeed = 2"), "there is no key speed"),
         (('name = "X"', 'name = "left"'), "name 'left': LinuxCNC knows the axes X, Y, Z"),
         (("serial:/dev/ttyUSB1:3000000", "ttyUSB1"), f"write {', '.join(CARRIERS.values())}"),
+        (("ttyUSB1:3000000", "ttyUSB1:fast"), "with a number at the end"),
+        (("ttyUSB1:3000000", "ttyUSB1:0"), "with a number at the end"),
         (('node = "serial', 'delay_ms = 2\nnode = "serial'), "delay_ms 2: a set-point needs 4"),
+        (('node = "serial', 'delay_ms = 15.5\nnode = "serial'), "queues those of 15 at most"),
+        (("velocity = 50", "velocity = 50\nhome_sequence = -1"), "must not be below 0"),
         (
             ("velocity = 50", "velocity = 50\nbacklash_um = 5"),
             "backlash_um needs the feature backlash of the axis",
@@ -277,5 +393,11 @@ def test_the_set_up_program_says_in_a_line_why_it_fails(capsys):
     with pytest.raises(SystemExit):
         set_up_program([*line, "--capture", "200"])
     assert "--capture needs two numbers, as 200:1000" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        set_up_program([*line, "--baud", "fast"])
+    assert "--baud: invalid int value: 'fast'" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        set_up_program([*line, "--baud", "0"])
+    assert "--baud must be above 0" in capsys.readouterr().err
     assert set_up_program(line) == 1
     assert re.fullmatch(r"moire: /dev/no_such_port: .*\n", capsys.readouterr().err)

@@ -21,13 +21,12 @@ def random_words(dice, count):
 
 
 def a_reply(dice, link):
-    """A good reply to the last request of a session: (packet, values, counts, expired)."""
+    """A good reply to the last request of a session: (packet, values, counts)."""
     values, counts = random_words(dice, link.reads), [dice.randrange(256) for _ in layout.CAUSES]
-    expired = dice.randrange(2)
-    state = sum(count << 8 * n for n, count in enumerate(counts)) | expired << 48
+    state = sum(count << 8 * n for n, count in enumerate(counts)) | dice.randrange(2) << 48
     identity = layout.KIND_REPLY | link.session << 8
     content = [identity, link.sequence, 77, state % WORD, state >> 32, *values, 0xABCD]
-    return sealed(content), values, counts, bool(expired)
+    return sealed(content), values, counts
 
 
 def taken(session, packet):
@@ -69,11 +68,11 @@ def test_good_replies_are_read():
         link = Link(dice.randrange(1 << 24), 0, dice.randrange(layout.MOST_VALUES + 1))
         link.sequence = dice.randrange(WORD)
         session = Session(link.session, 0, link.reads, link.sequence)
-        packet, values, counts, expired = a_reply(dice, link)
+        packet, values, counts = a_reply(dice, link)
         found = taken(session, packet)
         assert found and found.time == 77 and found.spare == 0xABCD
         assert found.values[: link.reads] == values
-        assert list(found.refused) == counts and found.expired == expired
+        assert list(found.refused) == counts
         assert link.reply(packet).values == tuple(values)
         assert driver().packet_reply_length(ctypes.byref(session)) == len(packet)
 

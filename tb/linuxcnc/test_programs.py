@@ -40,6 +40,7 @@ from moire.client.link import Captures
 from tb.linuxcnc.ideal_node import (
     CLK_HZ,
     PERIOD_CYCLES,
+    STILL,
     STREAMING,
     TICK,
     IdealAxis,
@@ -74,7 +75,7 @@ memory_kib = 64
 address = 1
 [linuxcnc]
 bus = "/dev/ttyUSB0"
-node = "serial:/dev/ttyUSB1:3000000"
+node = "serial:/dev/ttyUSB1:6000000"
 """ + "".join(
     f"""
 [[axis]]
@@ -105,11 +106,15 @@ PINS = {  # steps after a program
         ["pin", "moire.0.encoder.3.count", 0],
     ],
 }
+EXPIRED = "moire.0.watchdog.has-bit"
+REFUSED = [f"moire.0.{name}" for name in ("requests-refused", "refused-cause")]
+LOST = {"cable": 300, "burst": 12}  # packets; more and less than the watchdog of the node waits
 HELD = circle((12, 16), 2, 1, 600)
 STOPPED = {  # what interrupts a circle
     "estop": circle((6, 10), 1, 1, 600),
     "cable": circle((6, 14), 1, 1, 600),
     "power": circle((6, 18), 1, 1, 600),
+    "burst": circle((6, 22), 1, 1, 600),
 }
 
 
@@ -157,18 +162,20 @@ def above(positions):
 
 
 class Losses:
-    """The packets that are lost: four in a row of 25 at HELD, and 100 when the cable is pulled."""
+    """The packets that are lost: four in a row of 25 at HELD, and those of LOST."""
 
     def __init__(self):
-        self.pulled = 100
+        self.left = dict(LOST)
 
     def __call__(self, node):
         if near(node, HELD):
             return node.tick % 100 < 4 * 4
-        if self.pulled == 100 and not cutting(node, STOPPED["cable"]):
-            return False
-        self.pulled -= self.pulled > 0
-        return self.pulled > 0
+        for name, left in self.left.items():
+            if left < LOST[name] or cutting(node, STOPPED[name]):
+                self.left[name] -= left > 0
+                if left:
+                    return True
+        return False
 
 
 class Day(NamedTuple):
@@ -216,13 +223,15 @@ def day(tmp_path_factory, request):
     node = IdealNode(
         3, spindle=IdealAxis(turn=PERIODS_PER_TURN, spin=spin), above=above, has_pll=request.param
     )
-    steps = [["on"], ["home"], ["pins", *PLL_PINS]]
+    node.refused = [7] * len(node.refused)  # of an earlier session
+    steps = [["on"], ["home"], ["pins", *PLL_PINS], ["pins", *REFUSED]]
     for name in [*PROGRAMS, "lathe"]:
         steps += [["start", f"{name}.ngc"], ["finish"], *PINS.get(name, [])]
     steps += [["start", "held.ngc"], ["line", FIRST_LINE], ["override", 0.5]]
     steps += [["pause"], ["resume"], ["override", 1.2], ["finish"], ["override", 1.0]]
     for name in STOPPED:
-        steps += [["start", f"{name}.ngc"], ["stopped"], ["on"]]
+        steps += [["start", f"{name}.ngc"], ["stopped"]]
+        steps += [["pin", EXPIRED, True]] * (name == "cable") + [["on"], ["pin", EXPIRED, False]]
         steps += [["home"]] * (name == "power") + [["start", f"{name}.ngc"], ["finish"]]
     events = [
         (partial(cutting, program=STOPPED["estop"]), IdealNode.press_estop),
@@ -251,6 +260,10 @@ def test_the_pins_of_the_pll_say_how_long_before_the_request_the_node_captured(d
     locked, error, age_ms = day.pins(PLL_PINS)
     assert (locked, error) == (day.node.has_pll, 0)
     assert age_ms == pytest.approx(1e3 * CAPTURES.lead_s if locked else 0)
+
+
+def test_the_requests_that_the_node_refused_in_an_earlier_session_do_not_count(day):
+    assert not day.pins(REFUSED).any()
 
 
 def test_the_points_that_g38_touches_are_on_the_surface(day):
@@ -291,10 +304,28 @@ def test_after_the_cable_was_pulled_linuxcnc_runs_again_without_homing(day):
     assert day.last("cable").max() < MOST_ERROR_MM
 
 
+def test_after_a_burst_of_losses_the_axes_stop_under_control_and_linuxcnc_runs_again(day):
+    assert day.last("burst").max() < MOST_ERROR_MM
+    cuts = [cut for axis in day.node.axes[:3] for cut in axis.cuts]  # since the power was cut
+    assert len(cuts) >= 3 and max(map(abs, cuts)) < STILL
+
+
 def test_a_node_whose_power_was_cut_is_set_up_and_homed_again(day):
     assert day.last("power").max() < MOST_ERROR_MM
     for axis in day.node.axes[:3]:
         assert (axis.late, axis.refused) == (0, 0) and axis.accepted > 500
+
+
+def test_a_homing_that_is_aborted_ends_and_the_machine_stays_on(tmp_path):
+    node = IdealNode(3)
+    index = "moire.0.axis.2.index-enable"
+    steps = [["on"], ["homing"], ["pin", index, True], ["abort"], ["pin", index, False]]
+    steps += [["pins", "moire.0.axis.2.homed"], ["home"]]
+    with Served(node) as served:
+        ran = run(tmp_path, served, steps)
+    assert ran.done, ran.printed + str(ran.report)
+    assert not ran.report[-1]["pins"]["moire.0.axis.2.homed"] and not ran.report[-1]["messages"]
+    assert all(axis.homed for axis in node.axes)
 
 
 def test_a_gantry_whose_sides_come_apart_stops_the_machine_until_it_is_square(tmp_path):

@@ -107,6 +107,8 @@ static void serve(unsigned n, uint32_t requests) {
     if (fell >> n & 1u << NODE_AXIS_REQUESTS_STREAM_SHIFT) allow(n, false);
     if (fell >> n & 1u << NODE_AXIS_REQUESTS_ENABLE_SHIFT) keep(n, axis_enable(n, false));
     if (rose >> n & 1u << NODE_AXIS_REQUESTS_ENABLE_SHIFT) keep(n, axis_enable(n, true));
+    if (fell >> n & 1u << NODE_AXIS_REQUESTS_HOME_SHIFT && axis_state(n) == BUS_STATE_HOMING)
+        keep(n, axis_stop(n));
     if (rose >> n & 1u << NODE_AXIS_REQUESTS_HOME_SHIFT) keep(n, axis_home(n));
     if (rose >> n & 1u << NODE_AXIS_REQUESTS_STREAM_SHIFT) keep(n, begin(n));
 }
