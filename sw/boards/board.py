@@ -37,6 +37,7 @@ ETHERNET = {
 OF_THE_TOP = ("reference", "reset_n")  # of these, what the top drives and not the Ethernet core
 ETHERNET_HZ = {"mii": 25_000_000, "rgmii": 125_000_000}  # of its clocks
 ETHERNET_FAMILIES = {"mii": ("ecp5", "xc7"), "rgmii": ("ecp5",)}  # for which LiteEth makes its core
+MOST_HZ = 1_000_000_000  # of a clock
 MOST_DELAY_NS = 3.1  # of a pin of the ECP5
 PULLS = ("up", "down", "none")
 DIRECTIONS = ("both", "in", "out")
@@ -312,9 +313,9 @@ def load(path: Path) -> Board:
         loader=loader_of(table.table("loader", True)),
         part=part_of(table.table("part", True)),
         clock=Pad(clock.take("pin", str), "clock", "in"),
-        clock_hz=clock.take("hz", int),
+        clock_hz=clock.within("hz", 1, MOST_HZ),
         clock_ppm=clock.take("ppm", float),
-        node_hz=clock.take("node_hz", int),
+        node_hz=clock.within("node_hz", 1, MOST_HZ),
         pll_pad=clock.take("pll_pad", bool, False),
         on_board={
             name: Pad(

@@ -27,22 +27,19 @@ from typing import Any
 from boards import board as boards
 from boards import ethernet
 from boards import machine as machines
-from boards.block_ram import ContentsError
 from boards.board import Board
-from boards.family import Placer
 from boards.fit import Design, fit
-from boards.generate import files, placeholder
+from boards.generate import files
 from boards.machine import Machine
-from boards.size import firmware_stem
+from boards.packing import PLACED, pack, packing_hash
 from boards.toml_file import ROOT, Misfit, TooLarge, shown
-from figures.synthesis import SynthesisError, placed, run, yosys
+from figures.synthesis import SynthesisError, placed, yosys
 from firmware import build as firmware
 
 OUT = ROOT / "build" / "boards"
 NOTE = "note"  # of what the bitstream in a folder was made of
 # primitives of the Ethernet core besides those of the family
 FLIP_FLOPS = {"ecp5": "+/ecp5/cells_sim.v", "xc7": "+/xilinx/cells_sim.v"}
-PLACED, FILLED = "placed", "filled"  # files of nextpnr: with the placeholder, with the firmware
 KINDS = {  # of cells of a 7-series part, by the beginning of their names
     "LUT": "LUT",
     "FD": "flip-flops",
@@ -69,11 +66,6 @@ def fitting() -> tuple[list[Design], list[str]]:
         except TooLarge as why:
             refused.append(str(why))
     return found, refused
-
-
-def placeable() -> list[Design]:
-    """The designs that open tools place."""
-    return [design for design in fitting()[0] if design.board.part.family.placer]
 
 
 def write(design: Design) -> Path:
@@ -124,17 +116,9 @@ def synthesise(design: Design, folder: Path) -> Path:
     return yosys(folder / "top.sv", {}, last, f"board-{design.name}", first)
 
 
-def placer(design: Design) -> Placer:
-    """How the part of a design is placed."""
-    found = design.board.part.family.placer
-    if found is None:
-        raise Misfit(f"{design.board.file}: no open tool places a {design.board.part.name}")
-    return found
-
-
 def chip(design: Design) -> list[str]:
     """The options of nextpnr for the part."""
-    return placer(design).chip(design.board.part)
+    return design.placer.chip(design.board.part)
 
 
 def pinned(design: Design, folder: Path) -> list[str | Path]:
@@ -143,70 +127,32 @@ def pinned(design: Design, folder: Path) -> list[str | Path]:
     """
     part = design.board.part
     pins = folder.relative_to(ROOT) / part.family.constraints
-    return [*part.place, *placer(design).pins(pins)]
+    return [*part.place, *design.placer.pins(pins)]
 
 
 def place(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[float, dict[str, Any]]:
     """(MHz, utilization) after place and route; a clock that is not reached is a result. Whatever
-    was placed in this folder is replaced, so its note goes.
+    was placed in this folder is replaced, so its note and its bitstream go.
     """
-    (folder / NOTE).unlink(missing_ok=True)
-    by, mhz = placer(design), design.board.node_hz / 1e6
+    for name in (NOTE, design.board.part.family.bitstream):
+        (folder / name).unlink(missing_ok=True)
+    by, mhz = design.placer, design.board.node_hz / 1e6
     written = by.made(folder.relative_to(ROOT) / PLACED)
     return placed(netlist, by.nextpnr, chip(design), mhz, seed, *pinned(design, folder), *written)
 
 
 def counted(design: Design, folder: Path, netlist: Path) -> dict[str, Any]:
     """The utilization of the part after packing, without a placement: {cell: {used, available}}."""
-    by, mhz = placer(design), design.board.node_hz / 1e6
+    by, mhz = design.placer, design.board.node_hz / 1e6
     more = (*pinned(design, folder), "--pack-only")
     return placed(netlist, by.nextpnr, chip(design), mhz, 1, *more)[1]
-
-
-def program_of(design: Design, folder: Path) -> Path:
-    """The file of the firmware that a bitstream is made with: its bytes for the flash of a serial
-    core, else words for the block RAMs.
-    """
-    end = "bin" if design.machine.core == "serial" else "hex"
-    return folder / f"{firmware_stem(design.machine)}.{end}"
-
-
-def fill(design: Design, folder: Path) -> str:
-    """Puts the firmware in the place of the placeholder; the name of the file that is packed."""
-    contents = placer(design).contents
-    if not design.in_block_ram or contents is None:
-        return PLACED
-    words = [int(word, 16) for word in program_of(design, folder).read_text().split()]
-    text = (folder / PLACED).read_text()
-    try:
-        (folder / FILLED).write_text(contents.filled(text, placeholder(design), words))
-    except ContentsError as why:
-        raise SynthesisError(f"the firmware of {design.name} cannot be replaced: {why}") from None
-    return FILLED
-
-
-def pack(design: Design, folder: Path) -> Path:
-    """The bitstream; for a serial core the image of the flash, with the firmware behind it."""
-    part, here = design.board.part, folder.relative_to(ROOT)
-    made = folder / part.family.bitstream
-    words = placer(design).pack(part, here / fill(design, folder), made.relative_to(ROOT))
-    run(words, "packing", folder / "pack.log")
-    if design.machine.core == "serial":
-        program = program_of(design, folder).read_bytes()
-        content, start = made.read_bytes(), design.firmware_address
-        if len(content) > start:
-            raise SynthesisError(
-                f"the bitstream has {len(content)} bytes, the firmware is at {start}"
-            )
-        made.write_bytes(content.ljust(start, b"\xff") + program)
-    return made
 
 
 def used(design: Design, utilization: Mapping[str, Any]) -> str:
     """What a design takes of its part."""
     words = [
         f"{utilization[cell]['used']} of {utilization[cell]['available']} {name}"
-        for name, cell in placer(design).used.items()
+        for name, cell in design.placer.used.items()
         if cell in utilization
     ]
     return ", ".join(words)
@@ -282,13 +228,16 @@ class Note:
         (folder / NOTE).write_text(f"{self.placement} {self.seed} {self.packing}\n")
 
 
-def packing_hash(design: Design, folder: Path) -> str:
-    """A hash of what a bitstream is made of beside the placement: the options of the packer, and
-    the firmware, which a relay does not have.
-    """
-    program = program_of(design, folder).read_bytes() if design.machine.image else b""
-    options = placer(design).pack(design.board.part, Path(PLACED), Path())
-    return hashlib.sha256(repr(options).encode() + program).hexdigest()
+def note_of(design: Design) -> Note:
+    """The note of the placement that is there, if it is one of this design."""
+    folder = OUT / design.name
+    note = Note.read(folder)
+    if note.placement != state(design):
+        raise Misfit(
+            f"{shown(folder)} has no placement of this board, machine and RTL: make board "
+            f"{design.arguments} makes it"
+        )
+    return note
 
 
 def placed_again(design: Design, folder: Path, seed: int, say: Callable[[str], None]) -> None:
@@ -347,12 +296,7 @@ def new_firmware(design: Design, say: Callable[[str], None]) -> Path:
             f"{design.board.part.name}: make board {design.arguments} makes both"
         )
     check_tools(design)
-    note = Note.read(folder)
-    if note.placement != state(design):
-        raise Misfit(
-            f"{shown(folder)} has no placement of this board, machine and RTL: make board "
-            f"{design.arguments} makes it"
-        )
+    note = note_of(design)
     say(make_firmware(design, folder))
     return packed(design, folder, note, say)
 

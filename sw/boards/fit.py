@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from boards import clocks, size
 from boards.board import FLASH, Board, Ethernet, Pad
+from boards.family import Placer
 from boards.machine import (
     DRIVES,
     FEATURES,
@@ -20,6 +21,7 @@ from boards.machine import (
 from boards.toml_file import Misfit, TooLarge
 
 TICK_HZ = 4000  # servo tick that the firmware sets
+SPRAM = "-spram"  # option of the synthesis: large memories are single-port RAMs of an iCE40
 PLACEHOLDER = "placeholder"  # of the firmware; the name of its file
 
 
@@ -58,6 +60,14 @@ class Design:
     def ethernet(self) -> Ethernet | None:
         """The PHY, if the machine has its link over Ethernet."""
         return self.board.ethernet if self.machine.ip_address else None
+
+    @property
+    def placer(self) -> Placer:
+        """How its part is placed; refused if no open tool does."""
+        found = self.board.part.family.placer
+        if found is None:
+            raise Misfit(f"{self.board.file}: no open tool places a {self.board.part.name}")
+        return found
 
     @property
     def in_block_ram(self) -> bool:
@@ -165,6 +175,17 @@ def check_direction(board: Board, machine: Machine, one: Connection) -> None:
         )
 
 
+def check_turned(board: Board, machine: Machine, one: Connection) -> None:
+    """Refuses an output on a net that a turned connector has as well: its buffers may drive it."""
+    for name in wiring_for(board, machine).turned:
+        for pad in board.connectors[name].values():
+            if one.signal.direction != "in" and pad.ball == one.pad.ball:
+                raise Misfit(
+                    f"{machine.file}: {one.name} is an output, but {one.pad.place} is the same net "
+                    f"as {pad.place} of {board.file}, whose buffers were turned"
+                )
+
+
 def check_enable(board: Board, machine: Machine, one: Connection) -> None:
     """Refuses an enable of a drive that is high before the configuration."""
     if one.pad.pulled_up and one.signal.group == "drive_enable":
@@ -249,8 +270,10 @@ def check_twice(board: Board, machine: Machine, connections: list[Connection]) -
 def check_bus(board: Board, machine: Machine) -> None:
     """Refuses a node that nobody can talk to."""
     on_usb = "usb_rx" in board.on_board and "usb_tx" in board.on_board
-    if not on_usb and "rs485_rx" in [*machine.unused, *wiring_for(board, machine).unused]:
-        raise Misfit(f"{machine.file}: {board.file} has no USB serial port: connect rs485_rx")
+    unused = [*machine.unused, *wiring_for(board, machine).unused]
+    for name in ("rs485_rx", "rs485_tx"):
+        if not on_usb and name in unused:
+            raise Misfit(f"{machine.file}: {board.file} has no USB serial port: connect {name}")
 
 
 def check_ethernet(board: Board, machine: Machine) -> None:
@@ -301,12 +324,14 @@ def fit(board: Board, machine: Machine) -> Design:
     check_twice(board, machine, connections)
     for one in connections:
         check_direction(board, machine, one)
+        check_turned(board, machine, one)
         check_enable(board, machine, one)
         check_volts(board, machine, one)
     check_bus(board, machine)
     check_ethernet(board, machine)
     interface = board.ethernet.interface if board.ethernet else ""
-    needed = size.estimate(board.part.family.name, machine, interface)
+    spram = SPRAM in board.part.synthesis.split()
+    needed = size.estimate(board.part.family.name, machine, interface, spram)
     check_part(board, machine, needed)
     pll = clocks.pll(board.part.family.plls, board.clock_hz, board.node_hz, board.file)
     turned = wiring_for(board, machine).turned

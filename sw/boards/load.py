@@ -18,7 +18,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from boards.build import OUT, chosen
+from boards.build import OUT, chosen, note_of
 from boards.fit import Design, fit
 from boards.toml_file import ROOT, Misfit, shown
 
@@ -47,10 +47,14 @@ def program() -> list[str]:
 
 
 def bitstream(design: Design) -> Path:
-    """The bitstream that was made of a design."""
+    """The bitstream that was made of a design; one of an earlier state of its files is refused, but
+    for a part whose bitstream the tool of its vendor makes.
+    """
     made = OUT / design.name / design.board.part.family.bitstream
     if not made.is_file():
         raise Misfit(f"{shown(made)} is missing: make board {design.arguments} makes it")
+    if design.board.part.family.placer is not None:
+        note_of(design)
     return made
 
 

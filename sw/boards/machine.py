@@ -5,6 +5,7 @@ parameters of axes from the same file (moire.description).
 """
 
 import ipaddress
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,6 +126,9 @@ SCOPE_IMAGES = ("axis", "stream")  # whose firmware has its requests
 STREAM_IMAGES = ("stream", "steps_stream")  # whose firmware supervises set-points
 LOCAL_MAC = 0x024D  # the first two bytes of MAC addresses that we choose ourselves
 MOST_ORDERS = 16  # of a relay whose timing and size are known
+MOST_KIB, MOST_FILTERS, MOST_SEGMENTS = 4096, 4, 255  # memory; biquads and segments of an axis
+LEAST_SEGMENTS = 3
+OF_THE_TOP = ("led", "node")  # names that its own pins and signals begin with
 
 
 @dataclass(frozen=True)
@@ -246,8 +250,10 @@ def axis_of(table: Table) -> Axis:
     for name in ("linuxcnc", "unit", "parameters"):  # linuxcnc_config and the host read them
         table.left.pop(name, None)
     table.close()
-    if not axis.name.isidentifier():
+    if not axis.name.isidentifier() or not axis.name.isascii():
         raise table.misfit(f"name {axis.name!r} must consist of letters, digits and _")
+    if axis.name.lower() in OF_THE_TOP:
+        raise table.misfit(f"name {axis.name!r} is taken: signals of the top begin with it")
     for name in axis.features:
         needed = FEATURES[name][1]
         if not axis.has(needed):
@@ -293,8 +299,8 @@ def between_of(table: Table) -> dict[str, Between]:
         row = table.table(group)
         levels = row.left.pop("volts", None)
         volts = levels if isinstance(levels, list) else [levels]
-        if not volts or not all(isinstance(v, (int, float)) for v in volts):
-            raise row.misfit("volts must be a number or a list of numbers")
+        if not volts or not all(type(v) in (int, float) and 0 < v < math.inf for v in volts):
+            raise row.misfit("volts must be a number above 0 or a list of such numbers")
         part, front_end = row.take("part", str), row.take("front_end", str, "")
         found[group] = Between(part, [float(v) for v in volts], front_end)
         row.close()
@@ -330,8 +336,11 @@ def check(machine: Machine) -> None:
         return
     if not 1 <= len(names) <= MOST_AXES:
         raise Misfit(f"{file}: {len(names)} axes; a node has 1 to {MOST_AXES}")
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise Misfit(f"{file}: two axes have the name {twice[0]}")
+    ports = [name.lower() for name in names]
+    if twice := [name for name in names if ports.count(name.lower()) > 1]:
+        raise Misfit(
+            f"{file}: two axes have the name {twice[-1]}, as their pins are in small letters"
+        )
     if machine.image not in IMAGES:
         raise Misfit(f"{file}: [node] image {machine.image!r} is none of {', '.join(IMAGES)}")
     image = IMAGES[machine.image]
@@ -342,6 +351,10 @@ def check(machine: Machine) -> None:
         raise Misfit(f"{file}: the image {machine.image} has no drives, but axis {driven[0]} has")
     if not 1 <= machine.address <= 15:
         raise Misfit(f"{file}: [node] address {machine.address} must be 1 to 15")
+    if 0 < machine.segments < LEAST_SEGMENTS:
+        raise Misfit(
+            f"{file}: [node] segments = {machine.segments}: a table has {LEAST_SEGMENTS} at least"
+        )
     for size, feature in ((machine.segments, "segments"), (machine.filters, "filters")):
         with_it = [axis.name for axis in machine.axes if feature in axis.features]
         if bool(size) != bool(with_it):
@@ -417,11 +430,11 @@ def load(path: Path) -> Machine:
         orders=orders,
         image="" if is_relay else kind.take("image", str),
         core=core,
-        memory_kib=0 if is_relay else kind.take("memory_kib", int),
+        memory_kib=0 if is_relay else kind.within("memory_kib", 1, MOST_KIB),
         update=update,
         address=1 if is_relay else kind.take("address", int),
-        filters=0 if is_relay else kind.take("filters", int, 0),
-        segments=0 if is_relay else kind.take("segments", int, 0),
+        filters=0 if is_relay else kind.within("filters", 0, MOST_FILTERS, 0),
+        segments=0 if is_relay else kind.within("segments", 0, MOST_SEGMENTS, 0),
         scope_words=0 if is_relay else kind.take("scope_words", int, 0),
         axes=[axis_of(row) for row in table.rows("axis")],
         peripherals=[] if is_relay else kind.chosen("peripherals", PERIPHERALS),

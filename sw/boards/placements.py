@@ -28,6 +28,7 @@ from pathlib import Path
 
 from boards import build
 from boards.fit import Design
+from boards.packing import PLACED, pack
 from boards.toml_file import ROOT, Misfit, shown
 from campaigns.campaign import seeds
 from figures.synthesis import PLACEMENTS, NotEndedError, SynthesisError
@@ -115,12 +116,12 @@ def placed(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[Plac
     """
     try:
         mhz, utilization = build.place(design, folder, netlist, seed)
-        build.pack(design, folder)
+        pack(design, folder).unlink()  # it is proved; `make board` makes the one that is loaded
     except NotEndedError:
         raise
     except SynthesisError as why:
         return Placement(date.today(), failed=str(why).replace("'", "`")), ""
-    content = (folder / build.PLACED).read_bytes()
+    content = (folder / PLACED).read_bytes()
     digest = hashlib.sha256(content).hexdigest()[:DIGITS]
     return Placement(date.today(), mhz, digest), build.used(design, utilization)
 

@@ -39,6 +39,7 @@ SCOPE_STEP_WORDS, WAVEFORM = 512, 4  # recorder of ticks: words of a block; its 
 # and three of them differ, and the queue of an axis' captures
 COUNTING_NODE, COUNTING_AXIS = MEASURED["node_up5k_lc"], 562
 ICE40_BLOCK_RAM, ICE40_CAPTURE = 5, 6
+ICE40_KIB = 2  # block RAMs of a KiB
 RELAY, RELAY_BLOCK_RAM = MEASURED["relay_up5k_lc"], 5  # of 16 orders, on an iCE40
 TICK, TICK_AXIS = 70, 365  # cycles of the motion engine (docs/engine.md)
 TICK_FILTERS = {0: 0, 2: 115, 4: 219}  # further cycles of an axis with so many biquads
@@ -88,17 +89,20 @@ def ecp5_block_ram(machine: Machine) -> int:
     return found
 
 
-def estimate(family: str, machine: Machine, interface: str = "") -> Size:
-    """The size of a node for this machine; over Ethernet, with this interface to the PHY."""
+def estimate(family: str, machine: Machine, interface: str = "", spram: bool = False) -> Size:
+    """The size of a node for this machine; over Ethernet, with this interface to the PHY. With
+    `spram`, the memory of the soft core is no block RAM.
+    """
     axes = machine.axes
     if machine.orders:
         return Size(RELAY, RELAY_BLOCK_RAM)
     if family == "ice40":
         lut = COUNTING_NODE + (len(axes) - 4) * COUNTING_AXIS
+        block_ram = ICE40_BLOCK_RAM + ICE40_CAPTURE * sum(axis.has("capture") for axis in axes)
         if machine.core == "soft":
             lut += STEP_NODE - 2 * STEP_AXIS
-        captures = sum(axis.has("capture") for axis in axes)
-        return Size(lut, ICE40_BLOCK_RAM + ICE40_CAPTURE * captures)
+            block_ram += 0 if spram else ICE40_KIB * machine.memory_kib
+        return Size(lut, block_ram)
     sine = any(axis.has("sine") for axis in axes)
     shared = SINE_NODE - 2 * SINE_AXIS if sine else STEP_NODE - 2 * STEP_AXIS
     block_ram = ecp5_block_ram(machine)

@@ -47,6 +47,13 @@ class Table:
             raise self.misfit(f"{key} must be {NAMES.get(kind, kind.__name__)}")
         return found
 
+    def within(self, key: str, least: int, most: int, default: int | None = None) -> int:
+        """A whole number of a range."""
+        found = self.take(key, int, default)
+        if not least <= found <= most:
+            raise self.misfit(f"{key} = {found} must be {least} to {most}")
+        return found
+
     def words(self, key: str) -> list[str]:
         """A list of texts; empty if the key is not there."""
         found: list[Any] = self.take(key, list, [])
@@ -86,5 +93,7 @@ def read(path: Path) -> Table:
         return Table(tomllib.loads(path.read_text(encoding="utf-8")), shown(path))
     except OSError as why:
         raise Misfit(f"{shown(path)}: {(why.strerror or str(why)).lower()}") from None
+    except UnicodeDecodeError:
+        raise Misfit(f"{shown(path)}: is no text in UTF-8") from None
     except tomllib.TOMLDecodeError as why:
         raise Misfit(f"{shown(path)}: {why}") from None

@@ -77,7 +77,7 @@ def mill_pct(board: str, packs: bool = True) -> float:
         build.make_firmware(design, folder)
         found = build.counted(design, folder, build.synthesise(design, folder))
         console.print(f"{design.name}: {build.used(design, found)}")
-        cell = found[build.placer(design).used["LUT"]]
+        cell = found[design.placer.used["LUT"]]
         used, available = cell["used"], cell["available"]
     return 100 * used / available
 

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from boards import board, build, machine, placements
+from boards import board, build, machine, packing, placements
 from boards.fit import fit
 from figures.synthesis import NotEndedError, SynthesisError
 from tables.boards import placed_row
+from tb.system.board_files import packer
 
 NETLIST = """{"cells": {"$auto$rtl/axis.sv:%d$%d": {"type": "LUT4", "parameters": {"INIT": "%s"},
 "attributes": {"module_src": "rtl/node.sv:%d.1", "src": "rtl/axis.sv:%d.1"}, "connections": {}}}}"""
@@ -53,8 +54,10 @@ class Tools:
     def __init__(self, monkeypatch, folder):
         self.netlist, self.mhz = "a", 51.53
         self.calls = []
-        (folder / build.PLACED).write_text("placed")
-        for name in ("check_tools", "write", "make_firmware", "pack"):
+        self.folder = folder
+        (folder / packing.PLACED).write_text("placed")
+        monkeypatch.setattr(placements, "pack", packer(folder))
+        for name in ("check_tools", "write", "make_firmware"):
             monkeypatch.setattr(build, name, lambda *_: folder)
         monkeypatch.setattr(build, "synthesise", lambda *_: self.calls.append("yosys"))
         monkeypatch.setattr(build, "netlist_state", lambda *_: self.netlist)
@@ -76,6 +79,7 @@ def tools(monkeypatch, tmp_path):
 def test_what_is_in_the_record_is_not_measured_again(design, tools):
     first = placements.measured(design, [1, 2])
     assert tools.calls == ["yosys", 1, 2] and first.used == "1 of 2 LUT"
+    assert not (tools.folder / "moire.bit").exists(), "it would be loaded, whatever its clock"
     assert placements.worst_mhz(first, [1, 2]) == 51.53
     again = placements.measured(design, [1, 2])
     assert tools.calls == ["yosys", 1, 2] and placements.worst_mhz(again, [1, 2]) == 51.5

@@ -33,6 +33,17 @@ def refusal(make):
     return str(why.value)
 
 
+def packer(folder):
+    """A packer that makes an empty bitstream."""
+
+    def pack(*_):
+        made = folder / "moire.bit"
+        made.write_bytes(b"")
+        return made
+
+    return pack
+
+
 def assert_refused(path, name, words):
     """The machine of this file is refused for a board by its name, with the name of the file."""
     found = refusal(lambda: fit(board.named(name), machine.load(path)))

@@ -4,17 +4,18 @@
 import re
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from boards import board, build, clocks, generate, machine, placements, size
+from boards import board, build, clocks, generate, machine, packing, placements, size
 from boards.fit import fit
 from figures import synthesis
 from figures.boards import boards_failed
 from figures.synthesis import SynthesisError
 from tb.bench import ROOT
-from tb.system.board_files import DESIGNS, MILL, TOO_LARGE, edited, over_ethernet, refusal
+from tb.system.board_files import DESIGNS, MILL, TOO_LARGE, edited, over_ethernet, packer, refusal
 
 
 @pytest.fixture
@@ -27,8 +28,8 @@ def packed(monkeypatch):
 
         def pack(bits):
             write = lambda words, step, log: (ROOT / words[-1]).write_bytes(bits)
-            monkeypatch.setattr(build, "run", write)
-            return build.pack(design, folder).read_bytes()
+            monkeypatch.setattr(packing, "run", write)
+            return packing.pack(design, folder).read_bytes()
 
         yield pack
 
@@ -99,9 +100,10 @@ def test_the_figure_counts_builds_that_miss_their_clock_or_have_no_bitstream(
     names = ("icebreaker", "ice40_hx8k_evn", "tang_nano_9k", "arty_a7_35t")
     designs = [next(one for one in DESIGNS if one.board.name == name) for name in names]
     monkeypatch.setattr(build, "fitting", lambda: (designs, []))
-    for name in ("check_tools", "write", "make_firmware", "synthesise", "pack"):
+    for name in ("check_tools", "write", "make_firmware", "synthesise"):
         monkeypatch.setattr(build, name, lambda *_: tmp_path)
-    (tmp_path / build.PLACED).write_text("placed")
+    monkeypatch.setattr(placements, "pack", packer(tmp_path))
+    (tmp_path / packing.PLACED).write_text("placed")
     monkeypatch.setattr(build, "cells", lambda _: "1 LUT")
     monkeypatch.setattr(build, "place", place)
     monkeypatch.setattr(build, "netlist_state", lambda design, _: design.name)
@@ -128,6 +130,29 @@ def test_the_pll_makes_the_clock_of_the_node_exactly():
     xc7 = clocks.pll(clocks.xc7, 100_000_000, 50_000_000, "")
     assert xc7.settings == {"DIVCLK_DIVIDE": 1, "CLKFBOUT_MULT": 10, "CLKOUT0_DIVIDE": 20}
     assert clocks.pll(clocks.ecp5, 25_000_000, 25_000_000, "") is None
+
+
+@pytest.mark.parametrize(
+    "input_hz, output_hz",
+    [
+        (12_000_000, 50_000_000),  # the phase detector would run at 2 MHz
+        (100_000_000, 500_000_000),  # more than the output can do
+        (100_000_000, 3_000_000),
+    ],
+)
+def test_a_clock_beyond_the_limits_of_an_ecp5_is_refused(input_hz, output_hz):
+    found = refusal(lambda: clocks.pll(clocks.ecp5, input_hz, output_hz, "board.toml"))
+    assert found == f"board.toml: [clock] the PLL makes no {output_hz} Hz of {input_hz} Hz"
+
+
+def test_the_memory_of_an_ice40_without_large_rams_is_in_block_rams():
+    box = machine.named("counter_box")
+    soft = replace(box, core="soft")
+    more = (
+        size.estimate("ice40", soft).block_ram - size.estimate("ice40", soft, spram=True).block_ram
+    )
+    assert more == 2 * soft.memory_kib == 128
+    assert size.estimate("ice40", box) == size.estimate("ice40", box, spram=True)
 
 
 def test_the_pll_of_an_ice40_is_at_its_pad_where_the_clock_comes_in_there():

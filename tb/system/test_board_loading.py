@@ -13,13 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from boards import block_ram, board, build, load, machine
+from boards import block_ram, board, build, clocks, load, machine, packing
+from boards.family import FAMILIES
 from boards.fit import fit
 from boards.toml_file import Misfit
 from figures import synthesis
 from figures.synthesis import SynthesisError
 from tb.bench import ROOT, seed
-from tb.system.board_files import ULX3S, edited, refusal
+from tb.system.board_files import MILL, ULX3S, edited, refusal
 
 FAKE = """#!{python}
 import sys
@@ -47,6 +48,7 @@ def loader(tmp_path, monkeypatch):
 
     monkeypatch.setattr(build, "OUT", tmp_path)
     monkeypatch.setattr(load, "OUT", tmp_path)
+    monkeypatch.setattr(build, "state", lambda one: f"{hash(repr(one)):x}")
     return make
 
 
@@ -59,6 +61,8 @@ def made(one, folder):
     file = folder / one.name / one.board.part.family.bitstream
     file.parent.mkdir()
     file.write_bytes(b"bitstream")
+    (file.parent / packing.PLACED).write_text("placed")
+    build.Note(build.state(one), "1", "program").write(file.parent)
     return file
 
 
@@ -164,6 +168,26 @@ def test_what_the_loader_says_when_it_fails_is_passed_on(said, code, words, load
     assert found.startswith("loader failed: ") and words in found
 
 
+def test_a_bitstream_of_earlier_files_is_not_loaded(loader, tmp_path):
+    """As after a `make board` that missed its clock, or of another machine of the same name."""
+    options, one = loader(), design()
+    made(one, tmp_path)
+    other = fit(one.board, machine.load(edited(tmp_path, MILL, ("address = 1", "address = 2"))))
+    assert other.name == one.name
+    found = refusal(lambda: load.load(other, False))
+    assert "ulx3s_85f-mill has no placement of this board, machine and RTL: make board" in found
+    assert not options.exists()
+
+
+def test_a_bitstream_of_the_tool_of_the_vendor_is_loaded_as_it_is(loader, tmp_path):
+    options, one = loader(), design("arty_a7_35t")
+    file = tmp_path / one.name / "moire.bit"
+    file.parent.mkdir()
+    file.write_bytes(b"bitstream")
+    load.load(one, False)
+    assert options.read_text().splitlines()[-1] == str(file)
+
+
 @pytest.mark.parametrize("command, words", [("--flash", "flash"), ("--", "SRAM")])
 def test_the_command_says_where_the_bitstream_is(
     command, words, loader, tmp_path, monkeypatch, capsys
@@ -254,6 +278,43 @@ def test_new_firmware_in_a_placed_ecp5_equals_a_new_placement_with_it(netlist):
     assert block_ram.ECP5.filled(config(OLD), OLD, NEW) == config(NEW)
 
 
+PLL = """module top (input wire clock, output logic led);
+    wire clk;
+    (* {attributes} *)
+    EHXPLLL #(.CLKI_DIV(1), .CLKFB_DIV(2), .CLKOP_DIV(12), .FEEDBK_PATH("CLKOP")) u_clock (
+        .CLKI(clock), .CLKFB(clk), .CLKOP(clk), .RST(1'b0), .STDBY(1'b0)
+    );
+    always_ff @(posedge clk) led <= !led;
+endmodule
+"""
+
+
+def test_the_analog_part_of_a_placed_pll_equals_that_of_attributes_of_the_instance():
+    """Bit for bit, in the whole configuration."""
+
+    def config(attributes):
+        with tempfile.TemporaryDirectory(dir=synthesis.BUILD.parent) as name:
+            source = Path(name) / "top.sv"
+            source.write_text(PLL.format(attributes=attributes))
+            last = "synth_ecp5 -top {top} -json {netlist}"
+            cells = FAMILIES["ecp5"].read_cells
+            found = synthesis.yosys(source, {}, last, f"pll-{source.parent.name}", cells)
+            part = ["--25k", "--package", "CABGA381", "--lpf-allow-unconstrained"]
+            placed = synthesis.NEXTPNR_ECP5, part, 25, 1, "--textcfg", source.with_name("placed")
+            synthesis.placed(found, *placed)
+            return source.with_name("placed").read_text()
+
+    told = ", ".join(f'{name} = "{value}"' for name, value in clocks.ECP5_ANALOG.items())
+    with_zeros = config('FREQUENCY_PIN_CLKI = "25.0"')
+    made = packing.with_settings(with_zeros, clocks.ECP5_ANALOG)
+    assert made == config(f'FREQUENCY_PIN_CLKI = "25.0", {told}') != with_zeros
+
+
+def test_settings_that_a_placed_design_lacks_are_refused():
+    with pytest.raises(SynthesisError, match="the placed design has 0 settings ICP_CURRENT, not 1"):
+        packing.with_settings("word: ICP_CURRENTS 00000\n", {"ICP_CURRENT": 12})
+
+
 def test_new_firmware_in_a_gowin_netlist_equals_that_of_a_new_synthesis(netlist):
     """nextpnr leaves the contents of block RAMs as they are in the netlist of Yosys, and so does
     this: the netlist with other contents is all that the placement and the packer see.
@@ -295,12 +356,12 @@ def calls(monkeypatch):
         made.append(words.__setitem__)
 
         def program(one, folder):
-            build.program_of(one, folder).write_text(words["firmware"])
+            packing.program_of(one, folder).write_text(words["firmware"])
             return "firmware"
 
         def place(one, folder, _netlist, number):
             made.append(f"place {number}")
-            (folder / build.PLACED).write_text("placed")
+            (folder / packing.PLACED).write_text("placed")
             return one.board.node_hz / 1e6, {}
 
         def pack(command, _step, _log):
@@ -312,10 +373,11 @@ def calls(monkeypatch):
             "make_firmware": program,
             "synthesise": lambda *_: made.append("synthesis"),
             "place": place,
-            "run": pack,
             "used": lambda *_: "",
         }.items():
             monkeypatch.setattr(build, attribute, value)
+        monkeypatch.setattr(packing, "run", pack)
+        monkeypatch.setattr(packing, "with_settings", lambda text, _: text)
         filled = lambda _, text, old, new: f"{text} with {new}"
         monkeypatch.setattr(block_ram.Format, "filled", filled)
         yield made
@@ -377,12 +439,13 @@ def test_a_placement_for_a_figure_is_not_taken_for_that_of_make_board(monkeypatc
     one = design("colorlight_i5")
     with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
         folder = Path(name)
-        (folder / build.PLACED).write_text("placed")
+        (folder / packing.PLACED).write_text("placed")
+        (folder / "moire.bit").write_text("of another seed")
         build.Note("state", "1", "program").write(folder)
         assert build.Note.read(folder) == build.Note("state", "1", "program")
         monkeypatch.setattr(build, "placed", lambda *_: (1.0, {}))
         build.place(one, folder, folder / "netlist.json", 3)
-        assert build.Note.read(folder) == build.Note()
+        assert build.Note.read(folder) == build.Note() and not (folder / "moire.bit").exists()
 
 
 @pytest.mark.parametrize(
@@ -410,11 +473,11 @@ def test_firmware_that_has_no_bitstream_to_go_into_is_refused(names, words, call
 def test_a_placed_design_without_the_placeholder_is_refused():
     with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
         one, folder = design("colorlight_i5"), Path(name)
-        (folder / build.PLACED).write_text(".device LFE5U-25F\n")
+        (folder / packing.PLACED).write_text(".device LFE5U-25F\n")
         words = 256 * one.machine.memory_kib
-        build.program_of(one, folder).write_text("0\n" * words)
+        packing.program_of(one, folder).write_text("0\n" * words)
         with pytest.raises(SynthesisError) as why:
-            build.pack(one, folder)
+            packing.pack(one, folder)
         assert str(why.value) == (
             "the firmware of colorlight_i5-mill cannot be replaced: 0 of "
             f"{32 * words} bits of the memory are in block RAMs"

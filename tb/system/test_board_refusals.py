@@ -34,6 +34,7 @@ from tools import gowin
         ('package = "CABGA381"', 'package = "SG48"', "[part] a ecp5 85k has no package SG48"),
         ('family = "ecp5"', 'family = "ecp6"', "[part] family 'ecp6' is none of ecp5, ice40, "),
         ("hz = 25_000_000", 'hz = "25 MHz"', "[clock] hz must be a whole number"),
+        ("hz = 25_000_000", "hz = 0", "[clock] hz = 0 must be 1 to 1000000000"),
         ('usb_tx = "L4"', 'usb_ty = "L4"', "[on_board] usb_ty is none of usb_rx, usb_tx, "),
         ('"D7", "E7"]', '"D7"]', "[address] an address has 4 switches"),
         ('running = "H3"', 'runing = "H3"', "[leds] runing is none of running, sending, "),
@@ -116,6 +117,12 @@ def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
         ("address = 1", "address = 0", "[node] address 0 must be 1 to 15"),
         ("address = 1", "address = 1\nsegments = 255", "[node] segments = 255, but no axis has"),
         ('name = "Y"', 'name = "X"', "two axes have the name X"),
+        ('name = "Y"', 'name = "x"', "two axes have the name x, as their pins are in small"),
+        ('name = "Y"', 'name = "node"', "[axis 2] name 'node' is taken: signals of the top begin"),
+        ("memory_kib = 64", "memory_kib = 0", "[node] memory_kib = 0 must be 1 to 4096"),
+        ("address = 1", "address = 1\nfilters = 8", "[node] filters = 8 must be 0 to 4"),
+        ("address = 1", "address = 1\nsegments = -1", "[node] segments = -1 must be 0 to 255"),
+        ("address = 1", "address = 1\nsegments = 2", "[node] segments = 2: a table has 3 at least"),
         ('name = "Y"', 'name = "Y axis"', "[axis 2] name 'Y axis' must consist of letters"),
         (
             'name = "Y"',
@@ -346,6 +353,11 @@ V8 = "constraints/colorlight_5a_75b_v8_0/board.toml"
             'turned = ["J6", "J7", "J8"]',
             f"X.encoder_a is an input, but J5 R0 of {V8} is an output only behind its buffer (74HC",
         ),
+        (  # a net of a connector whose buffers are inputs now
+            'X.step = "J1 G0"',
+            'X.step = "J1 A"',
+            f"X.step is an output, but J1 A is the same net as J5 A of {V8}, whose buffers were",
+        ),
         (  # one net on two connectors
             'Z.step = "J2 G0"\nZ.direction = "J2 B0"',
             'Z.step = "J1 CLK"\nZ.direction = "J2 CLK"',
@@ -373,14 +385,27 @@ def test_what_the_buffers_of_the_5a_75b_do_not_allow_is_refused(old, new, words,
     assert_refused(path, "colorlight_5a_75b_v8_0", words)
 
 
-def test_a_node_without_any_bus_is_refused(tmp_path):
-    text = (
-        (ROOT / MILL).read_text().replace("address = 1\n", 'address = 1\nunused = ["rs485_rx"]\n')
-    )
+@pytest.mark.parametrize("name", ["rs485_rx", "rs485_tx"])
+def test_a_node_without_any_bus_is_refused(name, tmp_path):
+    text = (ROOT / MILL).read_text().replace("address = 1\n", f'address = 1\nunused = ["{name}"]\n')
     path = tmp_path / "mill.toml"
-    path.write_text(re.sub(r"^rs485_rx = .*\n", "", text, flags=re.M))
+    path.write_text(re.sub(rf"^{name} = .*\n", "", text, flags=re.M))
     found = refusal(lambda: fit(board.named("colorlight_5a_75b_v8_0"), machine.load(path)))
-    assert found == f"{path}: {V8} has no USB serial port: connect rs485_rx"
+    assert found == f"{path}: {V8} has no USB serial port: connect {name}"
+
+
+def test_a_file_that_is_no_text_in_utf_8_is_refused(tmp_path):
+    path = tmp_path / "mill.toml"
+    path.write_bytes('title = "Fräse"'.encode("latin-1"))
+    assert refusal(lambda: machine.load(path)) == f"{path}: is no text in UTF-8"
+
+
+@pytest.mark.parametrize("volts", ["-24", "0", "nan", "inf", "true", '"5 V"', "[]", "[3.3, -5.0]"])
+def test_levels_that_are_none_are_refused(volts, tmp_path):
+    changed = ('front_end = "rs485"\nvolts = 3.3', f'front_end = "rs485"\nvolts = {volts}')
+    path = edited(tmp_path, MILL, changed)
+    words = "[between.rs485] volts must be a number above 0 or a list of such numbers"
+    assert refusal(lambda: machine.load(path)) == f"{path}: {words}"
 
 
 def test_more_axes_than_a_node_has_are_refused(tmp_path):

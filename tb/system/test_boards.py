@@ -89,6 +89,15 @@ def test_page_and_drawing_name_each_connection(design):
     assert len(drawn) == len(design.connections)
 
 
+def test_the_page_says_what_keeps_each_drive_off_before_the_configuration():
+    for design in DESIGNS:
+        page = generate.files(design)["wiring.html"]
+        enables = [one for one in design.connections if one.signal.group == "drive_enable"]
+        buffered = sum(bool(one.pad.through) for one in enables)
+        assert page.count("a contact of its own must switch the power") == buffered
+        assert page.count("10 kΩ from the pin to GND") == len(enables) - buffered
+
+
 def test_the_pins_of_s0_on_the_ulx3s_are_those_of_its_first_release():
     """The pins of J1 and J2 as people have wired them."""
     design = fit(board.named("ulx3s_85f"), machine.named("s0"))
