@@ -20,11 +20,16 @@ def bound_words(tried: float, failed: float) -> str:
     return f"{upper_bound(int(failed), int(tried)):.2g}"
 
 
-def is_good(job: Job) -> bool:
-    """Whether all parts that were asked for are done, and few enough trials failed."""
+def is_bad(job: Job) -> bool:
+    """Whether a part could not be done, or too many trials of those that are done failed."""
     total = added(job.campaign, job.results)
     share = total[job.campaign.failed] / max(1, total[job.campaign.tried])
-    return not job.failures and not job.waiting and share <= job.campaign.allowed
+    return bool(job.failures) or share > job.campaign.allowed
+
+
+def is_good(job: Job) -> bool:
+    """Whether all parts that were asked for are done, and few enough trials failed."""
+    return not job.waiting and not is_bad(job)
 
 
 def sentence(job: Job) -> str:
@@ -74,9 +79,7 @@ def page(job: Job) -> str:
         head = ("part", "seed", "what went wrong", "the same again")
         tables.append(report.table(head, bad, text_columns=4))
     seeds = [job.task(part).part_seed for part in done]
-    verdict = "Good" if is_good(job) else "Not good"
-    if job.waiting and not bad:
-        verdict = "Not complete"
+    verdict = "Not good" if is_bad(job) else "Not complete" if job.waiting else "Good"
     return text_of(
         f"Campaign {job.name}",
         f"{verdict}. {campaign.what[:1].upper()}{campaign.what[1:]}.",

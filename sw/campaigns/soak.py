@@ -26,7 +26,7 @@ from rich.progress import (
 
 from campaigns import runner, version
 from campaigns.campaign import Campaign, Result, Task, added
-from campaigns.pages import is_good, page, sentence, whole
+from campaigns.pages import is_bad, is_good, page, sentence, whole
 from campaigns.runner import Failure, Job
 from campaigns.store import Store
 from figures.common import collected, console
@@ -116,13 +116,11 @@ def conclude(jobs: Mapping[str, Job], store: Store) -> int:
     failed = False
     for job in jobs.values():
         path = store.write_page(job.name, job.version, job.seed, page(job))
-        left = len(job.waiting)
-        good = is_good(job)
-        verdict = "good" if good else "BAD"
-        if left and not job.failures and not job.bad:
-            verdict = f"{left} of {job.parts} parts left"
-        else:
-            failed = failed or not good
+        verdict = "good" if is_good(job) else "BAD"
+        if is_bad(job):
+            failed = True
+        elif job.waiting:
+            verdict = f"{len(job.waiting)} of {job.parts} parts left"
         repeated = f", {job.repeated} parts from before" if job.repeated else ""
         print(f"{job.name}: {verdict}: {sentence(job)}{repeated}; page: {path}", flush=True)
     return int(failed)

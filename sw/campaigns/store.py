@@ -141,7 +141,7 @@ class Store:
         self.files.invalidate_cache(folder)
         try:
             names = self.files.ls(folder, detail=False)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return set()
         found = (PART.fullmatch(name.rpartition("/")[2]) for name in names)
         return {int(match[1]) for match in found if match}

@@ -9,27 +9,42 @@ commit is there for people; without git (in a container) MOIRE_COMMIT in the env
 import hashlib
 import os
 import subprocess
+from collections.abc import Sequence
+from fnmatch import fnmatch
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from twin.build import ROOT
 
 FOLDERS = ("rtl", "sw", "tables", "tb")
 FILES = ("requirements.lock",)
-SKIPPED = ("__pycache__", ".egg-info")
+IGNORED = ".gitignore"
 COMMIT = "MOIRE_COMMIT"
 UNKNOWN = "unknown"
 
 
+def made_here(path: PurePath, patterns: Sequence[str]) -> bool:
+    """Whether a file is made or fetched in a checkout: a pattern of .gitignore that begins with /
+    is one of a path or of a folder above it, another one that of a name.
+    """
+    paths = [str(PurePath(*path.parts[: n + 1])) for n in range(len(path.parts))]
+    return any(
+        fnmatch(each, pattern.strip("/"))
+        for pattern in patterns
+        for each in (paths if pattern.startswith("/") else path.parts)
+    )
+
+
 def sources(root: Path = ROOT) -> list[Path]:
     """Every file that a result may depend on."""
+    rows = (root / IGNORED).read_text(encoding="utf-8").splitlines()
+    patterns = [row for row in rows if row and not row.startswith("#")]
     found = [root / name for name in FILES]
     for folder in FOLDERS:
         for path in (root / folder).rglob("*"):
-            if path.is_file() and not any(
-                part.startswith(".") or part.endswith(SKIPPED)
-                for part in path.relative_to(root).parts
-            ):
+            inside = path.relative_to(root)
+            hidden = any(part.startswith(".") for part in inside.parts)
+            if path.is_file() and not hidden and not made_here(inside, patterns):
                 found.append(path)
     return sorted(found)
 

@@ -59,10 +59,6 @@ class Survivor:
         build = f" {self.build}" if self.build else ""
         return f"{self.mutant.place}: {self.block}{build}: {self.mutant.name}; {self.words}"
 
-    def explained_by(self, reason: Reason) -> bool:
-        """Whether a reason is about this one."""
-        return fits(reason, self.block, self.build, self.mutant)
-
 
 def fits(reason: Reason, block: str, build: str, mutant: CellMutant) -> bool:
     """Whether a reason is about a mutant of a build."""

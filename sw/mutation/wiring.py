@@ -241,6 +241,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("-k", default="", metavar="PART", help="connections with this in the name")
     options = parser.parse_args(arguments)
     files = [RTL / name for name in options.files] or list(diagrams())
+    if missing := [name for name, file in zip(options.files, files) if not file.is_file()]:
+        parser.error(f"there is no rtl/{missing[0]}")
     new = changed() if options.changed else None
 
     def chosen(connection: Connection) -> bool:

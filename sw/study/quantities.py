@@ -3,6 +3,7 @@
 "0.3 um", "2 %" or "5 ppm" to numbers in the unit of the parameter, and back.
 """
 
+import math
 import re
 from collections.abc import Mapping
 
@@ -71,6 +72,8 @@ def parse(value: object, unit: str) -> float:
         raise UnitError(f"{text} has no unit: write {allowed(unit)}")
     if worth is None:
         raise UnitError(f"'{text}' has the unit '{written}': write {allowed(unit)}")
+    if math.isinf(number):
+        raise UnitError(f"'{text}' is too large")
     return number * worth
 
 

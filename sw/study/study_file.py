@@ -23,6 +23,7 @@ from twin.parameters import tables
 
 RUNS, REPEATS = 100, 2  # where the file says nothing
 MOST_RUNS = 10**5
+MOST_NM = 10**12  # of a length
 TYPICAL_TO_BAD = "typical to bad"
 TYPICAL, NOMINAL = "typical", "nominal"
 LEAST_SHARE = 1e-3  # of a normal distribution that must be inside its limits
@@ -206,10 +207,11 @@ class Reader:
         """A length above zero, in nm."""
         if not isinstance(value, str):
             self.refuse(path, f'{value!r} has no unit: write a length such as "0.3 um"')
-        found = float(self.parsed(path, value, units.parse_length))
-        if found <= 0:
-            self.refuse(path, f"{path[-1]} is a length above zero, not '{value}'")
-        return found
+        found = self.parsed(path, value, units.parse_length)
+        if not 0 < found < MOST_NM:
+            least_and_most = f"above zero and below {MOST_NM / 10**9:g} m"
+            self.refuse(path, f"{path[-1]} is a length {least_and_most}, not '{value}'")
+        return float(found)
 
     def keys(self, name: str, known: Sequence[str]) -> None:
         """Refuses keys of a table that have no meaning."""

@@ -4,6 +4,7 @@ seed.
 """
 
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -83,12 +84,16 @@ def test_the_version_is_that_of_the_content(tmp_path):
         for one in ("rtl", "sw/fuzz", "tables", "tb"):
             (tmp_path / name / one).mkdir(parents=True)
         (tmp_path / name / "requirements.lock").write_text("")
+        shutil.copy(ROOT / ".gitignore", tmp_path / name)
         (tmp_path / name / "rtl" / "axis.sv").write_text(text)
         return tmp_path / name
 
     first, same, other = folder("a", "module"), folder("b", "module"), folder("c", "modul")
     (same / "sw" / "__pycache__").mkdir()
     (same / "sw" / "__pycache__" / "x.pyc").write_text("made")
+    for path in ("sw/host/moire/web/uplot-1.6/integrity", "sw/linuxcnc/moire.so"):
+        (same / path).parent.mkdir(parents=True)
+        (same / path).write_text("fetched, or made")
     assert version.content(first) == version.content(same) != version.content(other)
     assert version.version().endswith(f"-{version.content()}")
 
@@ -308,6 +313,17 @@ def test_a_share_of_the_length_and_an_allowed_share_of_failures(command, tmp_pat
     assert command(some) == 0
     few = Campaign("x; failed: y", lambda part, seed: {"n": 10, "y": 1}, 3, "n", "y", allowed=0.09)
     assert command(few, "--seed", "3") == 1
+
+
+def test_a_campaign_that_was_stopped_within_its_allowed_share_is_not_called_bad(keep, capsys):
+    one_of_ten = lambda part, seed: {"n": 10, "y": int(part == 0)}
+    some = Campaign("x; failed: y", one_of_ten, 3, "n", "y", allowed=0.1)
+    with runner.local(1, processes=False) as client:
+        job = ran(some, keep, client)
+    del job.results[2]
+    assert soak.conclude({"some": job}, keep) == 0
+    assert "some: 1 of 3 parts left: 1 y in 20 n" in capsys.readouterr().out
+    assert "Not complete" in page(job)
 
 
 def refused(command, capsys, *arguments):
