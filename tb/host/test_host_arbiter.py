@@ -5,14 +5,16 @@ import itertools
 
 import pytest
 
-from moire.bus.arbiter import Arbiter
+from moire.bus.arbiter import Arbiter, request
 from moire.bus.gateway import Gateway
 from moire.bus.protocol import IN_MOTION, parse_reply, request_body
 from moire.client.names import CAUSE_CODES
 from moire.client.node import register_fields
 from moire.made.bus_tables import CAUSES, PARAMETERS
+from moire.web.bridge import Bridge
 from tb.fakes.bus_node import PERIOD, BusNode
 from tb.fakes.rs485_bus import Rs485Bus
+from twin.compiled.tables import FAULT
 
 FAR = 1000 * PERIOD  # a target that is not reached within a test
 
@@ -190,6 +192,37 @@ def test_a_drive_that_another_client_now_needs_stays_on_until_that_one_has_gone(
     clients.arbiter.depart("B")
     clients.pass_time(1)
     assert node.state() == "off" and node.ended() == "stopped"
+
+
+def test_a_drive_that_a_fault_has_switched_off_belongs_to_who_switches_it_on_again(clients, node):
+    assert clients.ask("A", "enable", axis=0, on=1) == "ok"
+    assert clients.ask("B", "enable", axis=0, on=1) == "ok"
+    assert clients.arbiter.switched_on_by == {(1, 0): "A"}  # it was on
+    node.axes[0].causes = FAULT["drive"]
+    clients.pass_time(0.01)
+    assert node.state() == "faulted"
+    node.axes[0].causes = 0
+    assert clients.ask("B", "reset_faults", axis=0) == "ok"
+    assert clients.ask("B", "enable", axis=0, on=1) == "ok"
+    clients.arbiter.depart("A")
+    clients.pass_time(0.1)
+    assert node.state() == "holding"
+    clients.arbiter.depart("B")
+    clients.pass_time(0.1)
+    assert node.state() == "off"
+
+
+def test_a_stop_is_carried_out_however_much_its_client_asks_of_other_nodes_in_between(node):
+    other = BusNode(2)
+    gateway = Clients(node, other).gateway
+    bridge = Bridge(gateway)
+    client = bridge.client(None, "test")
+    stop, position = (request(name, axis=0) for name in ("stop", "position"))
+    for address, body in ((1, stop), *[(2, position)] * 255, (1, stop)):
+        bridge.send(client, address, body)
+        gateway.poll(0)
+    assert [node.executed.count("stop"), other.executed.count("position")] == [2, 255]
+    gateway.close()
 
 
 def test_an_axis_whose_node_does_not_answer_at_once_is_stopped_when_it_does(clients, node):

@@ -14,7 +14,7 @@ from experiments import machines
 from moire.bus.twin_port import MACHINES
 from moire.cli import command_line
 from tb.fakes.bus_node import BusNode
-from tb.fakes.rs485_bus import Rs485Bus
+from tb.fakes.rs485_bus import Rs485Bus, port_of
 from tb.host.call import Call, sentence
 from twin import BuildError
 
@@ -189,6 +189,17 @@ def test_ctrl_c_in_another_command_stops_what_moves_too():
     assert Call("move 100mm --no-wait -- watch --json", bus=bus).results[-1]["exit_code"] == 130
     assert node.executed[-1] == "enable" and "stop" in node.executed and node.ended() == "stopped"
     assert node.axes[0].position < 10_000_000 * 65536 // 800
+
+
+@pytest.mark.parametrize("more, code", [("", 0), (" -- move 1m", 1)])
+def test_what_still_moves_at_the_end_is_stopped_before_its_drive_is_switched_off(more, code):
+    node = BusNode()
+    node.home()
+    bus, seen = Rs485Bus(node), []
+    port_of(node).on_request = lambda name, fields: seen.append((name, fields, node.state()))
+    assert Call("move 100mm --no-wait" + more, bus=bus).code == code
+    assert seen[-1] == ("enable", {"axis": 0, "on": 0}, "holding")
+    assert node.ended() == "stopped"
 
 
 def test_an_output_that_nobody_reads_any_more_stops_the_axis():

@@ -4,10 +4,14 @@
 import pytest
 
 from moire.client.bus import Bus
+from moire.description import Description
 from moire.errors import BusError, NoAnswer, OutOfRange, Refused
+from moire.machine import Machine
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.stage import two_nodes
+
+PATIENT = "10s"  # for a watchdog, longer than a host waits for a node that does not answer
 
 
 def two_axes():
@@ -104,6 +108,35 @@ def test_a_node_that_misses_the_sync_is_named_and_the_others_are_stopped():
     unreachable.port.receive = receive
     bus.sync()  # nothing waits for it
     assert unreachable.state() == "prepared"
+
+
+def test_a_node_that_falls_silent_does_not_keep_the_others_from_being_stopped():
+    wire, bus = two_nodes()
+    chosen = [bus.axis(1), bus.axis(2), bus.axis(2, 1)]
+    for axis in chosen:
+        axis.set_parameter("watchdog_time", PATIENT)
+        axis.prepare(mm=50)
+    _, there = wire.nodes
+
+    def fall_silent(status):
+        wire.nodes = (there,)
+
+    with pytest.raises(NoAnswer, match="address 1"):
+        bus.start(*chosen, progress=fall_silent)
+    assert [there.ended(axis) for axis in (0, 1)] == ["stopped", "stopped"]
+    assert there.written("start_at_sync")[-1] == {"axes": 0}
+
+
+def test_a_node_that_falls_silent_does_not_keep_the_other_drives_on():
+    wire, bus = two_nodes()
+    _, there = wire.nodes
+    bus.axis(2, 1).set_parameter("watchdog_time", PATIENT)
+    bus.axis(2, 1).begin_move(mm=50)
+    wire.nodes = (there,)
+    with pytest.raises(NoAnswer, match="address 1"):
+        Machine(bus, Description()).close()
+    assert [there.state(axis) for axis in (0, 1)] == ["off", "off"]
+    assert there.ended(1) == "stopped" and wire.closed
 
 
 def test_none_starts_if_one_was_not_prepared():

@@ -11,7 +11,14 @@ import pytest
 
 from moire.cli import command_line
 from moire.client.bus import Bus
-from moire.errors import MotionFailed, NotCalibrated, OutOfRange, Refused, UnknownName
+from moire.errors import (
+    MotionFailed,
+    NoAnswer,
+    NotCalibrated,
+    OutOfRange,
+    Refused,
+    UnknownName,
+)
 from moire.made.bus_tables import PARAMETERS
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
@@ -130,10 +137,13 @@ def test_the_reason_of_a_failed_calibration_is_that_of_the_motion_and_not_of_its
 
 
 def test_calibration_needs_a_homed_axis_and_room_and_a_distance():
-    _, axis = stage(homed=False)
+    node, axis = stage(homed=False)
     axis.enable()
+    axis.set_correction(VALUES)
     with pytest.raises(Refused, match="home it first"):
         axis.calibrate()
+    assert axis.correction() == VALUES
+    assert node.parameter("velocity") == PARAMETERS["velocity"].default
     node, axis = stage()
     for wrong in (dict(distance="0mm"), dict(distance="-1mm"), dict(timeout=0)):
         with pytest.raises(OutOfRange, match="above zero"):
@@ -143,6 +153,56 @@ def test_calibration_needs_a_homed_axis_and_room_and_a_distance():
     axis.move(mm=119.5)
     axis.calibrate(distance="0.5mm")  # to the side with room
     assert node.axes[0].position == axis.to_counts("119.5mm") and "calibration" in node.executed
+
+
+@pytest.fixture
+def corrected():
+    """A node with a correction in force, homed and with its drive on, its axis, and the same axis
+    as another host on the same bus has it.
+    """
+    node, axis = stage()
+    axis.set_correction(VALUES)
+    axis.transport.wait(0.02)  # until the table is written
+    return node, axis, Bus(axis.transport).axis()
+
+
+def test_a_calibration_that_cannot_move_the_axis_changes_nothing(corrected):
+    node, axis, other = corrected
+    velocity = node.parameter("velocity")
+    other.begin_move(mm=50)
+    with pytest.raises(Refused, match="the axis is moving"):
+        axis.calibrate()
+    assert node.state() == "moving" and "stop" not in node.executed
+    other.stop_and_wait()
+    other.disable()
+    with pytest.raises(Refused, match="the drive is off"):
+        axis.calibrate()
+    assert axis.correction() == VALUES and node.parameter("velocity") == velocity
+    assert {fields["action"] for fields in node.written("calibration")} == {0}
+
+
+def test_a_motion_that_another_client_begins_between_two_strokes_goes_on(corrected):
+    node, axis, other = corrected
+    with pytest.raises(Refused, match="the axis is moving"):
+        axis.calibrate(lambda state: other.begin_move(mm=50))
+    assert node.state() == "moving" and "stop" not in node.executed
+    assert calibration(node)["frozen"] == 1
+
+
+def test_a_stroke_is_stopped_when_the_bus_has_failed(corrected):
+    node, axis, other = corrected
+    velocity, bus = node.parameter("velocity"), axis.transport
+    axis.set_parameter("watchdog_time", "0s")
+    silent_s = axis.node.bus.tries * axis.node.bus.answer_s
+    begins, whole = bus.now() + 0.2, bus.to_nodes
+    bus.at += [
+        (begins, lambda: setattr(bus, "to_nodes", lambda word: [])),
+        (begins + 1.2 * silent_s, lambda: setattr(bus, "to_nodes", whole)),
+    ]
+    with pytest.raises(NoAnswer):
+        axis.calibrate(distance="50mm")
+    assert node.ended() == "stopped" and node.parameter("velocity") == velocity
+    assert calibration(node)["frozen"] == 1
 
 
 def test_a_fault_during_calibration_is_the_error_that_is_raised():

@@ -91,6 +91,8 @@ def test_stations_come_from_a_file_in_degrees_or_with_units(tmp_path):
     file = tmp_path / "former.csv"
     file.write_text("angle,remark\n0, first # the first\n\n10.5\n11deg\n# all\n39700arcsec;x\n")
     assert read_stations(file) == [0, 37_800, 39_600, 39_700]
+    file.write_text('"angle";"remark, number"\n"0";"first, 1"\n10.5;2,5\n')
+    assert read_stations(file) == [0, 37_800]
 
 
 @pytest.mark.parametrize(
@@ -101,6 +103,11 @@ def test_stations_come_from_a_file_in_degrees_or_with_units(tmp_path):
         ("1\nx\n", "line 2"),
         ("a\nb\n1\n", "line 2"),
         ("1\n2mm\n", "line 2"),
+        ("0°\n10\n20\n", "line 1"),
+        ("angle;remark\n12,5;b\n", "line 2: '12,5;b' may begin with a decimal comma"),
+        ("0\n12,5\n", "line 2: '12,5' may begin with a decimal comma"),
+        ('"12,5",b\n', "line 1: .* decimal comma"),
+        ("12 ,5;b\n", "line 1"),
     ],
 )
 def test_a_bad_line_of_a_file_is_named(tmp_path, text, words):

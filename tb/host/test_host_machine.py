@@ -480,6 +480,45 @@ def test_two_axes_move_together_in_one_task(monkeypatch):
     asynchronous(work, monkeypatch, BusNode(1), BusNode(2))
 
 
+def test_the_axes_of_a_node_that_many_tasks_ask_for_at_once_have_one_node(monkeypatch):
+    async def work(machine, bus):
+        found = await asyncio.gather(*[machine.axis(f"1.{n % 2}") for n in range(20)])
+        assert {axis.blocking.node for axis in found} == {machine.blocking.node(1)}
+        assert {axis.blocking for axis in found} == set(machine.blocking.node(1).axes.values())
+
+    asynchronous(work, monkeypatch, BusNode(1, axes=2))
+
+
+def test_an_axis_that_is_asked_for_while_it_is_made_is_one_object(bus, monkeypatch):
+    read_period, found = blocking_axis.Axis.read_period, []
+
+    def meanwhile(axis):
+        if not found:
+            found.append(None)
+            found[0] = axis.node.axis(0)  # as another thread does it
+        return read_period(axis)
+
+    monkeypatch.setattr(blocking_axis.Axis, "read_period", meanwhile)
+    with moire.connect("any") as machine:
+        assert machine.node(1).axis(0) is found[0] is machine.axis("1.0")
+
+
+def test_a_drive_is_switched_off_at_the_end_of_a_block_though_the_stop_fails(monkeypatch):
+    async def work(machine, bus):
+        x = await machine.axis("1.0")
+        with pytest.raises(BusError):
+            async with x.enabled():
+                bus.nodes[0].port.on_request = fail
+        bus.nodes[0].port.on_request = lambda *request: None
+        assert not bus.nodes[0].axes[0].enabled
+
+    def fail(name, fields):
+        if name == "status":
+            raise BusError(1, "the status is not read")
+
+    asynchronous(work, monkeypatch, BusNode(1))
+
+
 def test_a_cancelled_task_stops_its_axis_under_control_and_the_other_one_goes_on(monkeypatch):
     async def work(machine, bus):
         x, y = [await machine.axis(name) for name in ("1.0", "2.0")]

@@ -4,6 +4,7 @@
 import random
 from dataclasses import replace
 from fractions import Fraction
+from types import SimpleNamespace
 
 import pytest
 
@@ -222,6 +223,49 @@ def test_a_tuning_is_written_gain_by_gain_and_filter_by_filter():
     ]
     with pytest.raises(OutOfRange, match="the servo has 2 filters, the tuning 3"):
         axis.set_tuning(replace(tuning, filters=tuning.filters * 3))
+
+
+OLD = dict(kp=2000, ki=50, kd=900, kv=1, ka=2)
+NEW = dict(kp=9000, ki=20, kd=4000, kv=3, ka=4)
+NOTCH, OTHER_NOTCH = (1, 2, 3, 4, 5), (6, 7, 8, 9, 10)
+
+
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        ((), (NOTCH,)),
+        ((NOTCH,), ()),
+        ((NOTCH,), (OTHER_NOTCH,)),
+        ((NOTCH, OTHER_NOTCH), (OTHER_NOTCH, NOTCH)),
+    ],
+)
+@pytest.mark.parametrize("gains", [(OLD, NEW), (NEW, OLD)])
+def test_the_filters_of_a_tuning_change_while_the_gains_are_small(old, new, gains):
+    _, node, axis = stage()
+    before, after = gains
+    axis.set_tuning(SimpleNamespace(**before, filters=old))
+    seen = []
+    node.port.on_request = lambda *request: seen.append(axis_tuning(node))
+    axis.set_tuning(SimpleNamespace(**after, filters=new))
+    seen.append(axis_tuning(node))
+    assert seen[0] == (before, old) and seen[-1] == (after, new)
+    smaller = {name: min(before[name], after[name]) for name in before}
+    for found, filters in seen:
+        assert filters in (old, new) or len(old) == 2 and filters == ()  # there is no room
+        largest = before if filters == old else after if filters == new else smaller
+        assert all(found[name] <= largest[name] for name in ("kp", "ki", "kd"))
+    assert axis.tuning() == (after, new)
+
+
+def axis_tuning(node):
+    """Gains and filters as the firmware has them."""
+    found = node.parameters()
+    filters = tuple(
+        tuple(found[f"filter_{number}_{name}"] for name in ("b0", "b1", "b2", "a1", "a2"))
+        for number in (1, 2)
+        if found["filters"] & number
+    )
+    return {name: found[name] for name in OLD}, filters
 
 
 def test_a_travel_whose_ends_are_swapped_is_refused_by_the_host():

@@ -3,18 +3,22 @@
 replayed, and faults are found.
 """
 
+import errno
+import io
 import json
+import os
 
 import pytest
 
 from moire.bus import recording
+from moire.cli import ports
 from moire.client.bus import Bus
 from moire.errors import BadFile
 from moire.made.registers import MAP_CRC
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
 from tb.host.call import Call, sentence
-from twin.compiled.tables import FAULT
+from twin.compiled.tables import FAULT, PERIOD
 
 SINE = ("sine", "monitor", "harmonics", "recorder")  # what is built of sine and cosine
 
@@ -34,7 +38,7 @@ def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
     assert call.code == 0 and call.out.endswith("the same, 0 with other values, 0 different\n")
     assert int(call.out.split()[0]) > 20
     done = [name for name in node.executed if name not in ("status", "identify", "get_parameter")]
-    assert done == ["enable", "home", "move", "read_register", "enable"]
+    assert done == ["enable", "home", "move", "read_register", "stop", "enable"]
     assert node.axes[0].position == 1_000_000 * 65536 // 800
 
 
@@ -172,6 +176,35 @@ def test_a_record_of_another_protocol_is_refused():
 def test_a_record_that_cannot_be_written_is_one_sentence(tmp_path):
     call = Call(f"--record {tmp_path}/no/such.jsonl status")
     assert "such.jsonl cannot be written" in sentence(call, 2) and call.bus.closed
+    call = Call("--record /dev/full status")
+    assert "No space left on device" in sentence(call, 2) and call.bus.closed
+    assert call.bus.nodes[0].executed == []
+
+
+class FullDisk(io.StringIO):
+    """A file that has room for so many lines."""
+
+    name = "session.jsonl"
+
+    def __init__(self, room):
+        super().__init__()
+        self.room = room
+
+    def write(self, text):
+        self.room -= 1
+        if self.room < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return super().write(text)
+
+
+@pytest.mark.parametrize("room", [1, 2, 60, 61])
+def test_a_record_that_ends_since_the_disk_is_full_disturbs_nothing(monkeypatch, room):
+    node, file = BusNode(), FullDisk(room)
+    monkeypatch.setattr(ports, "open", lambda *_, **__: file, raising=False)
+    call = Call("--record session.jsonl home -- move 1mm", node)
+    assert "the record session.jsonl ends at" in sentence(call, 2)
+    assert "No space left on device" in call.err and file.closed and call.bus.closed
+    assert node.axes[0].position == 1250 * PERIOD and not node.axes[0].enabled
 
 
 # ------------------------------------------------------------------ watch, fault and self-test

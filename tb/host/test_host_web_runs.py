@@ -3,13 +3,16 @@
 along the travel, and the names of machine.toml.
 """
 
+import asyncio
+
 import pytest
 
 from moire.client.segments import Segments, SegmentTable
 from moire.description import AxisDescription, Description
 from moire.web import calibrating
 from moire.web.api import OPERATIONS
-from moire.web.bridge import ClientBus
+from moire.web.bridge import THREADS, Client, ClientBus
+from moire.web.refusals import BadRequest
 from tb.fakes.served import Served, homed
 from tb.host.test_host_feedback import node_with_signal
 from tb.host.test_host_job import Workshop
@@ -18,6 +21,7 @@ from twin.compiled.tables import PERIOD
 
 AXIS = "/api/nodes/1/axes/0"
 RUN = f"{AXIS}/calibration"
+ADDRESSES = range(1, THREADS["long"] + 1)
 
 
 @pytest.fixture
@@ -98,6 +102,55 @@ def test_a_wrong_calibration_is_refused_and_an_axis_without_a_zero_stays_off():
             assert values["error"]["cause"] == "not_homed" and "enable" not in served.node.executed
     finally:
         served.end()
+
+
+def test_of_two_calibrations_that_are_begun_at_once_the_second_is_refused():
+    class Waiting:
+        """A bridge whose commands for A never end."""
+
+        def __init__(self):
+            self.calibrations = {}
+
+        async def command(self, client, place, work):
+            assert client is first_client
+            await asyncio.Event().wait()
+
+    first_client = Client("A")
+
+    async def both():
+        bridge = Waiting()
+        first = asyncio.create_task(calibrating.begin(bridge, first_client, (1, 0), {}))
+        await asyncio.sleep(0)
+        with pytest.raises(BadRequest, match="axis 1.0 is being calibrated by A"):
+            await calibrating.begin(bridge, Client("B"), (1, 0), {})
+        first.cancel()
+        await asyncio.wait([first])
+        assert bridge.calibrations == {}
+
+    asyncio.run(both())
+
+
+def test_calibrations_do_not_keep_the_parameters_from_being_read():
+    served = Served(*map(homed, ADDRESSES))
+    runs = served.door.bridge.calibrations
+    try:
+        with served.http() as client:
+            for address in ADDRESSES:
+                begun = f"/api/nodes/{address}/axes/0/calibration"
+                client.done("POST", begun, {"distance": "100 mm"})
+            assert client.done("GET", f"{AXIS}/parameters")["parameters"]
+            assert [run.state for run in runs.values()] == ["running"] * len(ADDRESSES)
+    finally:
+        served.end()
+
+
+def test_a_calibration_of_an_axis_that_another_client_moves_is_refused(served):
+    with served.http() as client, served.http() as other:
+        other.done("POST", f"{AXIS}/move", {"to": "100 mm", "wait": False})
+        status, values = client.ask("POST", RUN)
+        assert (status, values["error"]["cause"]) == (409, "busy")
+        assert client.done("GET", RUN)["state"] == "none"
+        assert client.done("GET", AXIS)["state"] == "moving"
 
 
 def test_the_harmonics_are_amplitudes_in_nm():

@@ -64,6 +64,11 @@ class SharedBus(Bus):
         with self.lock:
             return super().exchange(address, operation, tries=tries, answer_s=answer_s, **fields)
 
+    def node(self, address: int = 1) -> blocking_node.Node:
+        """The node at an address, which is one object for all threads."""
+        with self.lock:
+            return super().node(address)
+
     def until_next_poll(self, polled: blocking_node.Node, seconds: float | None = None) -> None:
         """Raises Cancelled, once, where the task has been cancelled."""
         cancelled: threading.Event | None = getattr(self.here, "cancelled", None)
@@ -182,10 +187,12 @@ class Axis:
         try:
             yield self
         finally:
-            if (await self.status()).in_motion:
-                await self.stop_and_wait()
-            if not was_enabled:
-                await self.disable()
+            try:
+                if (await self.status()).in_motion:
+                    await self.stop_and_wait()
+            finally:
+                if not was_enabled:
+                    await self.disable()
 
     async def samples(
         self, every: units.Value = "20ms", duration: units.Value | None = None

@@ -48,14 +48,24 @@ class Machine:
         return self.bus.find()
 
     def close(self) -> None:
-        """Switches off what was switched on, and closes the port."""
+        """Switches off what was switched on, and closes the port.
+
+        A drive that cannot be switched off does not keep the others on; the first error is raised
+        at the end.
+        """
+        errors: list[MoireError] = []
         try:
             for node in self.bus.nodes.values():
                 for number in sorted(node.switched_on):
                     node.axis(number).stop_if_enabled()
-                    node.axis(number).disable()
+                    try:
+                        node.axis(number).disable()
+                    except MoireError as error:
+                        errors.append(error)
         finally:
             self.bus.transport.close()
+        if errors:
+            raise errors[0]
 
     def __enter__(self) -> Self:
         return self

@@ -34,6 +34,7 @@ RECORDS = ("arm_scope", "record_ticks")  # the requests that arm the two recorde
 POLLS = frozenset({"identify", "status", "position", "encoder", "signal"})  # may be merged
 TABLE_AXIS = 0  # the axis of turn_to
 OTHER_CLIENT = next(code for code, (name, _) in CAUSES.items() if name == "other_client")
+DRIVE_OFF = ("off", "faulted")  # states of an axis
 CLAIM_S = 2.0  # of the time of the bus: so long a claim holds while nothing moves
 POLL_S = 0.02  # between two looks at an axis whose client has left, of the time of the bus
 SILENCE_S = 0.5  # of the time of the bus: a node that has been silent so long is given up
@@ -79,6 +80,8 @@ class Arbiter:
         if body == known and operation != "follow":  # each reply to follow has a new position
             return reply
         places = list(places_of(address, operation, body))
+        if operation == "enable" and body[-1]:
+            self.forget_switched_off(client, places[0])
         if is_motion(operation, body) and any(self.is_of_another(client, one) for one in places):
             answered: Reply = bytes([body[1], OTHER_CLIENT])
         else:
@@ -101,6 +104,13 @@ class Arbiter:
             return True
         self.moved_by.pop(place)
         return False
+
+    def forget_switched_off(self, client: Hashable, place: Place) -> None:
+        """Before the client switches a drive on: a fault, or a loss of power, may have switched it
+        off since another client switched it on. That one has nothing to switch off any more.
+        """
+        if self.switched_on_by.get(place, client) != client and self.state(place) in DRIVE_OFF:
+            self.switched_on_by.pop(place)
 
     def claim(self, client: Hashable, place: Place) -> None:
         """The axis belongs to this client now, while it moves and for CLAIM_S from now on."""

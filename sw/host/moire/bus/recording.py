@@ -11,7 +11,8 @@ are the calls of the transport with their time in seconds. The words have 9 bits
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TextIO
 
@@ -44,18 +45,36 @@ KEYS = (
 
 
 class Recorder(Transport):
-    """Passes every call on to a transport, and writes it to a file that is open for text."""
+    """Passes every call on to a transport, and writes it to a file that is open for text.
+
+    The first line that cannot be written ends the record. All calls still reach the transport, so
+    that what moves can be stopped, and close() then raises BadFile.
+    """
 
     def __init__(self, transport: Transport, file: TextIO):
         self.transport, self.file = transport, file
+        self.failure: BadFile | None = None
         self.character_s, self.handshake = transport.character_s, transport.handshake
         self.time_is_stopped = transport.time_is_stopped
         self.began = transport.now()
         self.write({**KIND, "protocol_crc": PROTOCOL_CRC})
 
     def write(self, entry: dict[str, Any]) -> None:
-        """Writes one line."""
-        self.file.write(json.dumps(entry) + "\n")
+        """Writes one line, unless an earlier one could not be written."""
+        if self.failure is None:
+            with self.failing_once():
+                self.file.write(json.dumps(entry) + "\n")
+
+    @contextmanager
+    def failing_once(self) -> Iterator[None]:
+        """For a block that uses the file; keeps its first error."""
+        try:
+            yield
+        except OSError as error:
+            self.failure = self.failure or BadFile(
+                f"the record {self.file.name} ends at {self.now() - self.began:.3f} s, since it "
+                f"cannot be written: {error.strerror}"
+            )
 
     def send(self, words: Sequence[int]) -> None:
         self.write({"at": self.now() - self.began, "send": list(words)})
@@ -85,8 +104,11 @@ class Recorder(Transport):
         self.character_s = self.transport.character_s
 
     def close(self) -> None:
-        self.file.close()
+        with self.failing_once():
+            self.file.close()
         self.transport.close()
+        if self.failure is not None:
+            raise self.failure
 
 
 def read(text: str, name: str = "text") -> list[Call]:

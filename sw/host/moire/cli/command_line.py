@@ -6,6 +6,7 @@ file.
 import os
 import signal
 import sys
+from contextlib import closing
 from typing import TextIO
 
 from moire.cli import completion
@@ -37,6 +38,16 @@ def main(
 def carry_out(session: Session, arguments: list[str]) -> int:
     """Carry out the commands and close the session. Returns the exit code."""
     try:
+        with closing(session):
+            return carry_out_commands(session, arguments)
+    except MoireError as error:
+        session.complain(error)
+        return error.exit_code
+
+
+def carry_out_commands(session: Session, arguments: list[str]) -> int:
+    """Carry out the commands; an error is reported. Returns the exit code."""
+    try:
         try:
             session.description = described(arguments)
             for planned in parse_call(arguments, session.description):
@@ -62,8 +73,6 @@ def carry_out(session: Session, arguments: list[str]) -> int:
         session.stop_axes()
         close_output(session.out)
         return 0
-    finally:
-        session.close()
 
 
 def described(arguments: list[str]) -> Description:

@@ -154,9 +154,11 @@ def serve_doors(
     except KeyboardInterrupt:
         pass  # the normal end
     finally:
-        gateway.close()
-        if web is not None:
-            web.close()
+        try:
+            gateway.close()
+        finally:
+            if web is not None:
+                web.close()
 
 
 def web_door(gateway: "Gateway", doors: Doors, description: Description) -> "WebDoor":

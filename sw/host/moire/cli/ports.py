@@ -32,4 +32,7 @@ def recorded(transport: Transport, file: str) -> Transport:
     except OSError as error:
         transport.close()
         raise BadFile(f"the file {file} cannot be written: {error.strerror}") from None
-    return recording.Recorder(transport, opened)
+    recorder = recording.Recorder(transport, opened)
+    if recorder.failure is not None:  # even the first line
+        recorder.close()  # raises it
+    return recorder

@@ -149,19 +149,20 @@ class Session:
                 thread.join()
 
     def close(self) -> None:
-        """Switch off what this call has switched on, and close the port."""
+        """Stop under control what still moves of what this call has switched on, switch it off, and
+        close the port. Raises BadFile when the record of the call is not complete.
+        """
         if self.opened is None:
             return
         for axis in self.switched_on.values():
             try:
-                axis.disable()
-            except MoireError:
-                pass  # the watchdog of the node does it
+                axis.stop_if_enabled()
+            finally:
+                with suppress(MoireError):  # else the watchdog of the node does it
+                    axis.disable()
         if self.opened.baud_changed:
-            try:
+            with suppress(MoireError):  # else the nodes do it after a while
                 self.opened.first_baud()
-            except MoireError:
-                pass  # the nodes do it after a while
         self.opened.transport.close()
 
 

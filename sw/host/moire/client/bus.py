@@ -14,6 +14,7 @@ the others whose drives it has switched on.
 
 import random
 from collections.abc import Iterable
+from contextlib import suppress
 
 from moire.bus.exchanges import Exchanges
 from moire.bus.protocol import ADDRESSES, Exchange, Reply, Timing, request_body, sync_words
@@ -22,7 +23,7 @@ from moire.client.axis import Axis
 from moire.client.names import refusal
 from moire.client.node import Node, register_fields
 from moire.client.records import Identity, Progress, Status
-from moire.errors import BusError, BusGarbled, NoAnswer, OutOfRange, PortError
+from moire.errors import BusError, BusGarbled, MoireError, NoAnswer, OutOfRange, PortError
 
 SYNC_S = 0.002  # after this time the firmware, too, knows what the sync began
 BAUD_CHANGE_S = 0.005  # a node changes its rate after its reply, at most this much later
@@ -259,10 +260,11 @@ class Bus:
                     )
             return [axis.wait(progress) for axis in axes]
         except BaseException:
-            for address in masks:
-                self.request(address, "start_at_sync", axes=0)
             for axis in axes if begun else ():
                 axis.stop_if_enabled()
+            for address in masks:
+                with suppress(MoireError):  # a node that does not answer must not keep the others
+                    self.request(address, "start_at_sync", axes=0)
             raise
 
     # baud rate

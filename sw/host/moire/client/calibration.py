@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 from moire import units
 from moire.client.records import CalibrationState, Status
 from moire.client.values import ParameterValue
-from moire.errors import MoireError, NotCalibrated, OutOfRange
+from moire.errors import BusError, MoireError, NotCalibrated, OutOfRange
 
 if TYPE_CHECKING:
     from moire.client.axis import Axis
@@ -39,9 +40,9 @@ def calibrate(
         Fraction(axis.node.identity.sample_hz // SAMPLES),
         stroke / axis.period_nm / Fraction(STROKE_S),
     )
-    axis.calibration("clear")
-    axis.calibration("calibrate")
+    axis.calibration()  # raises Refused if the axis is not built for it
     end, strokes = axis.transport.now() + float(patience), 0
+    begun = False  # the first stroke is accepted: from then on there is a new correction
     reason = "standstill"  # the latest one in motion: at the end of a stroke the axis is at rest
 
     def follow(status: Status) -> None:
@@ -49,11 +50,20 @@ def calibrate(
         if status.state == "moving" and (now := axis.calibration().reason) != "standstill":
             reason = now
 
+    def next_stroke() -> None:
+        nonlocal begun
+        axis.begin_move(nm=start if strokes % 2 else far)
+        if not begun:
+            begun = True
+            axis.calibration("clear")
+            axis.calibration("calibrate")
+        axis.wait(follow)
+
     try:
         while True:
             speed = fastest * SPEEDS[strokes // 2 % len(SPEEDS)]
             axis.write_parameter("velocity", max(1, round(speed)))
-            axis.move(nm=start if strokes % 2 else far, progress=follow)
+            carry_out(axis, next_stroke)
             strokes += 1
             state = replace(axis.calibration(), reason=reason)
             if progress is not None:
@@ -68,7 +78,7 @@ def calibrate(
                     f"{state.refused} refused)",
                 )
     finally:
-        end_calibration(axis, velocity)
+        end_calibration(axis, velocity, begun)
 
 
 def ends_of_stroke(axis: Axis, stroke: Fraction) -> tuple[Fraction, Fraction]:
@@ -84,16 +94,25 @@ def ends_of_stroke(axis: Axis, stroke: Fraction) -> tuple[Fraction, Fraction]:
     return start, far
 
 
-def end_calibration(axis: Axis, velocity: ParameterValue) -> None:
-    """Freezes the correction and restores the velocity, as far as that is possible. An axis that
-    still moves is stopped first: the velocity does not change during a motion.
+def carry_out(axis: Axis, stroke: Callable[[], None]) -> None:
+    """Carries out a stroke. Whatever interrupts it stops the axis under control, but a stroke that
+    is refused, or ended by somebody else, stops nothing: another client may move the axis then.
+    """
+    try:
+        axis.stopping_on_error(stroke)
+    except BusError:
+        axis.stop_if_enabled()
+        raise
+
+
+def end_calibration(axis: Axis, velocity: ParameterValue, begun: bool = True) -> None:
+    """Restores the velocity and, if a stroke was begun, freezes the correction, as far as that is
+    possible. It does not stop the axis.
 
     An error here is dropped, since the one that ended the calibration explains more.
     """
-    try:
-        if axis.status().in_motion:
-            axis.stop_and_wait()
-        axis.calibration("freeze")
+    if begun:
+        with suppress(MoireError):
+            axis.calibration("freeze")
+    with suppress(MoireError):
         axis.write_parameter("velocity", velocity.counts)
-    except MoireError:
-        pass

@@ -11,6 +11,7 @@
 An angle is a number in arcsec, or a text with a unit such as "12.5deg".
 """
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -33,6 +34,7 @@ from moire.made.bus_tables import CAUSES, FAULTS, JOB_ACTIONS, JOB_FLAGS, JOB_ST
 
 ACTIONS = {name: code for code, (name, _) in JOB_ACTIONS.items()}
 AT_REST = ("idle", "finished", "paused", "unsure")
+DECIMAL_COMMA = re.compile(r'"?[+-]?\d+,\d')  # or a comma that separates two numbers
 SAVE_S = 30  # a list of 360 stations needs less than one second on the bus
 
 
@@ -109,7 +111,9 @@ def equal_parts(count: int) -> list[Fraction]:
 def read_stations(path: str | Path) -> list[Fraction]:
     """Stations in arcsec from the first column of a CSV file; raises BadFile.
 
-    An angle has a unit or is in degrees. A # begins a comment, and the first line may be a heading.
+    An angle has a unit or is in degrees. A # begins a comment, and the first line may be a heading,
+    which has no digit in its first column. In a line with a semicolon only semicolons separate. An
+    angle that may have a decimal comma is refused.
     """
     try:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
@@ -120,13 +124,19 @@ def read_stations(path: str | Path) -> list[Fraction]:
     angles: list[Fraction] = []
     heading = False
     for number, line in enumerate(lines, 1):
-        cell = line.partition("#")[0].replace(";", ",").partition(",")[0].strip().strip('"')
+        text = line.partition("#")[0].strip()
+        cell = text.partition(";" if ";" in text else ",")[0].strip().strip('"')
         if not cell:
             continue
+        if DECIMAL_COMMA.match(text):
+            raise BadFile(
+                f"{path}, line {number}: '{text}' may begin with a decimal comma: write a decimal "
+                "point, or a space after a comma that separates"
+            )
         try:
             angles.append(Fraction(cell) * 3600 if is_number(cell) else units.parse_angle(cell))
         except MoireError as error:
-            if angles or heading:
+            if angles or heading or any(map(str.isdigit, cell)):
                 raise BadFile(f"{path}, line {number}: {error}") from None
             heading = True
     if not angles:

@@ -46,7 +46,7 @@ class Node:
                 "no_such_axis", code, f"node {self.address} has no axis {number}: it has {known}"
             )
         if number not in self.axes:
-            self.axes[number] = Axis(self, number)
+            self.axes.setdefault(number, Axis(self, number))  # another thread may have been faster
         return self.axes[number]
 
     def start(self, *axes: int, progress: Progress | None = None) -> list[Status]:

@@ -21,7 +21,9 @@ from moire.errors import OutOfRange, Refused, with_more
 from moire.made.bus_tables import PARAMETERS
 
 TRAVEL = ("travel_low", "travel_high")
-GAINS = ("kp", "ki", "kd", "kv", "ka")
+FEEDBACK = ("kd", "kp", "ki")  # in the order to raise them: what damps comes first
+FEEDFORWARD = ("kv", "ka")
+GAINS = (*FEEDBACK, *FEEDFORWARD)
 # the node refuses this value of the first together with another than 0 of the second
 EXCLUSIVE = (("position_source", "own_steps", "step_output"), ("drive", "dac", "fine_reach"))
 # while one of these is on, the node refuses values of others: they are switched off first
@@ -189,16 +191,26 @@ class AxisParameters(AxisAccess):
         return {name: self.get_parameter(name).counts for name in GAINS}, filters
 
     def set_tuning(self, tuning: Tuning) -> None:
-        """Sets the gains and filters that moire.analysis.tune made.
+        """Sets the gains and filters that moire.analysis.tune made; the drive may be on.
 
-        Filters that the tuning does not use are switched off.
+        The filters change while each feedback gain is the smaller one of its old and its new value,
+        and the new gains come last. The new filters are written where none is in use, and then
+        replace the old ones at once. If there is no room, the old ones are switched off first.
         """
         if len(tuning.filters) > FILTERS:
             raise OutOfRange(f"the servo has {FILTERS} filters, the tuning {len(tuning.filters)}")
-        self.write_parameter("filters", 0)
-        for name in GAINS:
-            self.write_parameter(name, getattr(tuning, name))
-        for number, coefficients in enumerate(tuning.filters, 1):
+        for name in reversed(FEEDBACK):
+            old = self.get_parameter(name).counts
+            self.write_parameter(name, min(old, getattr(tuning, name)))
+        used = self.get_parameter("filters").counts
+        free = [number for number in range(FILTERS) if not used >> number & 1]
+        if len(free) < len(tuning.filters):
+            self.write_parameter("filters", 0)
+            free = list(range(FILTERS))
+        chosen = dict(zip(free, tuning.filters))
+        for number, coefficients in chosen.items():
             for name, value in zip(FILTER, coefficients, strict=True):
-                self.write_parameter(f"filter_{number}_{name}", value)
-        self.write_parameter("filters", (1 << len(tuning.filters)) - 1)
+                self.write_parameter(f"filter_{number + 1}_{name}", value)
+        self.write_parameter("filters", sum(1 << number for number in chosen))
+        for name in (*FEEDBACK, *FEEDFORWARD):
+            self.write_parameter(name, getattr(tuning, name))

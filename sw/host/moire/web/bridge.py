@@ -7,7 +7,6 @@ that its arbiter sees every request. A reply may be given to several clients if 
 """
 
 import asyncio
-import itertools
 import math
 import threading
 import time
@@ -20,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from moire.bus.arbiter import Place, request
 from moire.bus.gateway import Gateway, Waiting
-from moire.bus.protocol import ADDRESSES, NAMES, Reply, parse_reply
+from moire.bus.protocol import ADDRESSES, MOST_AXES, NAMES, Reply, parse_reply
 from moire.bus.recent import Sample
 from moire.bus.transport import Transport
 from moire.client.access import length_of_counts, status_of
@@ -47,10 +46,25 @@ LOOK_S = 0.002  # of the clock, between two looks at the time of the bus
 # waiting; and one that has never answered
 ABSENT_S, NEVER_S = 1.0, 10.0
 NO_NAMES = Description()
-# for commands, for what takes a hundred exchanges, and for streams, of which a node has one
-THREADS = {"short": 8, "long": 2, "stream": 8}
+# for commands, for what takes a hundred exchanges, for streams, of which a node has one, and for
+# calibrations, of which an axis has one
+THREADS = {"short": 8, "long": 2, "stream": 8, "calibration": len(ADDRESSES) * MOST_AXES}
 
 Result = TypeVar("Result")
+
+
+class Numbers:
+    """The sequence numbers of a client's requests. Two in a row to the same node are not alike, or
+    the second would be taken for a repeated one, whatever others have asked in between.
+    """
+
+    def __init__(self) -> None:
+        self.last: dict[int, int] = {}  # by address
+
+    def next(self, address: int) -> int:
+        """The number of the next request to a node."""
+        self.last[address] = number = (self.last.get(address, -1) + 1) % 256
+        return number
 
 
 class Client:
@@ -61,9 +75,7 @@ class Client:
     def __init__(self, name: str, given: str | None = None):
         self.name, self.given, self.heard = name, given, time.monotonic()
         self.busy = 0  # requests in progress
-        # of its requests: two in a row are not alike, or the second would be taken for a repeated
-        # one, whatever others have asked in between
-        self.numbers = itertools.count()
+        self.numbers = Numbers()
         # its last samples of sine and cosine by axis, see moire.web.lissajous
         self.samples: dict[Place, deque[tuple[int, int, int, float]]] = {}
         self.left = False
@@ -85,7 +97,7 @@ class Bridge:
     def __init__(self, gateway: Gateway, description: Description = NO_NAMES):
         self.gateway, self.description = gateway, description
         self.loop: asyncio.AbstractEventLoop | None = None  # that of the doors
-        self.numbers = itertools.count()
+        self.numbers = Numbers()
         self.open: set[Future[Sample | None]] = set()  # what has been asked and not answered
         self.lock, self.closed = threading.Lock(), False
         self.named: dict[str, Client] = {}
@@ -117,10 +129,12 @@ class Bridge:
         """
         require_address(address)
         future: Future[Sample | None] = Future()
+        numbers = client.numbers if isinstance(client, Client) else self.numbers
         with self.lock:
             if self.closed:
                 raise PortError("the server ends")
             self.open.add(future)
+            number = bytes([numbers.next(address)])
 
         def answer(reply: bytes | None) -> None:
             with self.lock:
@@ -130,8 +144,6 @@ class Bridge:
             result = None if reply is None else Sample(self.gateway.time, reply[1:])
             settle(partial(future.set_result, result))
 
-        numbers = client.numbers if isinstance(client, Client) else self.numbers
-        number = bytes([next(numbers) % 256])
         waiting = Waiting(client, address, number + body, answer)
         self.gateway.call_soon(partial(self.enqueue, waiting))
         return future

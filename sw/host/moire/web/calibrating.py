@@ -6,13 +6,15 @@ clients ask how far it is. What was corrected before is kept for a comparison.
 import asyncio
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Any
 
 from moire.bus.arbiter import Place
 from moire.client.axis import HARMONICS, Axis
 from moire.client.calibration import end_calibration
+from moire.client.names import CAUSE_CODES, refusal
 from moire.client.records import CalibrationState, Correction
 from moire.client.values import ParameterValue
 from moire.errors import MoireError
@@ -28,8 +30,8 @@ class Run:
     """One calibration. `before` has the harmonics that were corrected at its beginning, in nm."""
 
     client: Client
-    before: list[float]
-    velocity: ParameterValue  # of the axis, which has other ones meanwhile
+    before: list[float] = field(default_factory=list)
+    velocity: ParameterValue | None = None  # of the axis, which has other ones meanwhile
     state: str = "running"
     words: str = "the calibration begins"
     strokes: int = 0
@@ -63,14 +65,24 @@ async def begin(bridge: Bridge, client: Client, place: Place, given: Mapping[str
             HTTPStatus.CONFLICT,
         )
 
-    def prepare(axis: Axis) -> Run:
-        run = Run(client, harmonics_nm(axis), axis.get_parameter("velocity"))
-        if not axis.status().enabled:
-            axis.enable_for("move")
-        return run
+    run = Run(client)
 
-    run: Run = await bridge.command(client, place, prepare)
-    bridge.calibrations[place] = run
+    def prepare(axis: Axis) -> None:
+        run.before, run.velocity = harmonics_nm(axis), axis.get_parameter("velocity")
+        status = axis.status()
+        if status.in_motion:
+            raise refusal(place[0], "calibration", CAUSE_CODES["busy"])
+        if not status.enabled:
+            axis.enable_for("move")
+
+    bridge.calibrations[place] = run  # the next one who asks sees it at once
+    try:
+        await bridge.command(client, place, prepare)
+    except BaseException:
+        del bridge.calibrations[place]
+        if found is not None:
+            bridge.calibrations[place] = found
+        raise
     distance, timeout = given.get("distance", "1mm"), given.get("timeout", "120s")
     run.task = asyncio.create_task(carry_out(bridge, run, place, distance, timeout))
     return run
@@ -83,14 +95,24 @@ async def carry_out(bridge: Bridge, run: Run, place: Place, distance: str, timeo
             run.client,
             place,
             lambda axis: axis.calibrate(run.progress, distance, timeout),
-            "long",
+            "calibration",
         )
         run.state, run.words = "done", "the correction is complete and frozen"
     except MoireError as error:
-        run.state, run.words = "ended", str(error)
+        words = str(error)
         if run.client.left:
-            run.words = "its client has left"
-            await bridge.command(bridge, place, lambda axis: end_calibration(axis, run.velocity))
+            words = "its client has left"
+            await tidy_up(bridge, run, place)
+        run.state, run.words = "ended", words
+
+
+async def tidy_up(bridge: Bridge, run: Run, place: Place) -> None:
+    """Ends what a client has left: the arbiter stops the axis, whose velocity is then restored."""
+    velocity = run.velocity
+    assert velocity is not None  # since the calibration was begun
+    with suppress(MoireError):
+        await bridge.end_of_motion(place, lambda status: status.in_motion)
+        await bridge.command(bridge, place, lambda axis: end_calibration(axis, velocity))
 
 
 async def values_of(bridge: Bridge, client: Client, place: Place) -> dict[str, Any]:
