@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """bus.c and parameters.c: which requests are answered, refused (and why) or ignored."""
 
+import math
 import random
 import zlib
 
@@ -280,6 +281,23 @@ def test_values_too_large_for_a_register_saturate():
     assert machine.axes[0].word[DEFINES["AXIS_STOP_DECELERATION"]] == 2**32 - 1
 
 
+def test_a_clock_of_the_dac_that_is_too_slow_for_its_register_is_refused():
+    clk_hz = random.Random(seed()).randint(20_000_000, 100_000_000)
+
+    class FastNode(CompiledNode):
+        def read(self, offset):
+            return clk_hz if offset == DEFINES["NODE_CLK_HZ"] else super().read(offset)
+
+    machine, dac = FastNode(), DEFINES["ACTUATOR_DAC"]
+    most = DEFINES["ACTUATOR_DAC_HALF_PERIOD_MASK"]
+    slowest = math.ceil(clk_hz / (2 * most))
+    machine.set(dac_clock=slowest)
+    assert machine.actuators[0][dac] & most == most
+    fields = {"axis": 0, "parameter": PARAMETER["dac_clock"]["id"]}
+    assert machine.request("set_parameter", **fields, value=slowest - 1)[0] == "out_of_range"
+    assert machine.ask("get_parameter", **fields)["value"] == slowest
+
+
 def test_the_watchdog_time_is_one_for_all_axes():
     machine = CompiledNode(Axis(), Axis())
     machine.set(axis=1, watchdog_time=77)
@@ -315,6 +333,7 @@ def test_registers_are_read_by_address_but_never_a_queue():
         0xFFFC,
         0xFFFF,
         DEFINES["BUS_BASE"] + DEFINES["BUS_RECEIVE"],
+        DEFINES["NODE_BASE"] + DEFINES["NODE_SCOPE_WORD"],
         DEFINES["PERIPHERALS_BASE"] + DEFINES["PERIPHERALS_I2C_ANSWER"],
         DEFINES["PERIPHERALS_BASE"] + DEFINES["PERIPHERALS_PEER_RECEIVE"],
     ):

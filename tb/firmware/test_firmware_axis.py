@@ -337,6 +337,32 @@ def test_the_wait_for_a_sync_can_be_cancelled_and_only_prepared_axes_can_wait():
     assert machine.status()["state"] == "prepared"
 
 
+@pytest.mark.parametrize("end", ["stop", "disable", "estop", "start"])
+def test_an_axis_that_waits_no_longer_is_not_started_by_a_sync(end):
+    machine = two_homed()
+    for n in (0, 1):
+        machine.ask("prepare", axis=n, target=100 * PERIOD)
+    machine.ask("start_at_sync", axes=3)
+    if end == "start":
+        machine.ask("start", axes=1)
+        assert finish(machine) == "ok"
+    elif end == "stop":
+        machine.ask("stop", axis=0)
+    elif end == "disable":
+        machine.ask("enable", axis=0, on=0)
+        machine.ask("enable", axis=0, on=1)
+    else:
+        machine.axes[0].causes = FAULT["estop"]
+        machine.run(1)
+        machine.axes[0].causes = 0
+        machine.ask("reset_faults", axis=0)
+        machine.ask("enable", axis=0, on=1)
+    machine.ask("prepare", axis=0, target=200 * PERIOD)
+    sync(machine)
+    assert [machine.status(n)["state"] for n in (0, 1)] == ["prepared", "moving"]
+    assert not machine.axes[0].player.moving and machine.axes[1].player.moving
+
+
 @pytest.mark.parametrize("end", ["stop", "disable", "estop"])
 def test_a_prepared_motion_that_is_cancelled_does_not_start_later(end):
     machine = two_homed()
@@ -387,6 +413,19 @@ def test_the_kind_of_drive_changes_only_with_the_drive_off(name, value):
     machine.ask("enable", axis=0, on=0)
     machine.ask("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)
     assert machine.ask("get_parameter", axis=0, parameter=PARAMETER[name]["id"])["value"] == value
+
+
+@pytest.mark.parametrize("name", ["decoder_mode", "position_source"])
+def test_with_another_count_the_zero_is_unknown(name):
+    machine = homed()
+    machine.ask("enable", axis=0, on=0)
+    fields = {"axis": 0, "parameter": PARAMETER[name]["id"]}
+    machine.set(**{name: machine.ask("get_parameter", **fields)["value"]})
+    assert "homed" in machine.status()["flags"]
+    machine.set(**{name: machine.ask("get_parameter", **fields)["value"] + 1})
+    assert "homed" not in machine.status()["flags"]
+    machine.ask("enable", axis=0, on=1)
+    assert machine.request("move", axis=0, target=PERIOD)[0] == "not_homed"
 
 
 PAIR = ("step_output", 1), ("position_source", 2)  # own steps are pulse and direction

@@ -4,12 +4,14 @@ together, and the host is refused what would disturb it.
 """
 
 import math
+import random
 
 import pytest
 
+from tb.bench import seed
 from twin.compiled.axis import Axis
 from twin.compiled.node import CompiledNode
-from twin.compiled.tables import CLK_HZ, DEFINES, PARAMETER, TABLE
+from twin.compiled.tables import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE
 
 BLOCK = DEFINES["FEEDBACK_BASE"]
 REASON = {code: name for name, (code, _) in TABLE["calibration_reason"].items()}
@@ -445,6 +447,30 @@ def test_only_index_capture_and_compare_may_be_written():
         machine.request("write_register", address=address("INDEX") + 1, value=0)[0]
         == "no_such_register"
     )
+
+
+@pytest.mark.parametrize("words", [("LOW", "HIGH"), ("HIGH", "LOW")])
+def test_each_word_of_a_compare_position_is_written_by_itself_also_while_an_axis_moves(words):
+    """The node writes the wide registers of its segments between the two requests."""
+    source, machine = random.Random(seed()), CompiledNode(Axis(), Axis())
+    machine.set(home_method=35, travel_high=10**9)
+    machine.ask("enable", axis=0, on=1)
+    machine.ask("home", axis=0)
+    assert machine.run(3000, until=lambda: machine.status()["ended"] == "ok")
+    machine.ask("move", axis=0, target=10_000 * PERIOD)
+    registers = [(f"COMPARE_{name}", axis) for name in ("START", "STEP") for axis in (0, 1)]
+    wanted = {register: source.getrandbits(48) for register in registers}
+    for word in words:
+        for (name, axis), value in wanted.items():
+            shift = 32 if word == "HIGH" else 0
+            part = value >> shift & 0xFFFFFFFF
+            machine.ask("write_register", address=address(f"{name}_{word}", axis), value=part)
+        pushed = len(machine.axes[0].pushed)
+        machine.run(40)
+        assert len(machine.axes[0].pushed) > pushed
+    for (name, axis), value in wanted.items():
+        channel = machine.feedback_channels[axis]
+        assert channel.wide(f"FEEDBACK_{name}", 48) % 2**48 == value, (name, axis)
 
 
 def test_the_burst_of_the_calibration_cannot_be_read_by_the_host():

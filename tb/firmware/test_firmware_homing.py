@@ -10,7 +10,7 @@ import pytest
 from tb.bench import seed
 from twin.compiled.axis import Axis
 from twin.compiled.node import CompiledNode
-from twin.compiled.tables import DEFINES, PARAMETER, PERIOD
+from twin.compiled.tables import DEFINES, FAULT, INDEX, PARAMETER, PERIOD
 
 QUARTER = PERIOD // 4
 COUNTS = 1  # position_source
@@ -80,6 +80,53 @@ def test_a_search_of_s3_that_may_have_started_on_a_wide_index_passes_it_again(ap
     marks = [0, apart * QUARTER]
     ended, machine = home(Axis(position=0, index=marks), -2)
     assert ended == "ok" and zero_of(machine) == want * QUARTER
+
+
+@pytest.mark.parametrize("distance", [PERIOD, 3 * PERIOD, 15 * PERIOD])
+@pytest.mark.parametrize("side", [1, -1])
+def test_s3_passes_the_index_from_far_enough_below_though_the_home_distance_is_short(
+    distance, side
+):
+    index = 3 * PERIOD + QUARTER
+    axis = Axis(position=index + side * (distance - QUARTER), index=[index])
+    ended, machine = home(axis, -2, home_distance=distance)
+    assert ended == "ok" and zero_of(machine) == index
+
+
+DIRECTIONS = DEFINES["FEEDBACK_INDEX_UP_MASK"] | DEFINES["FEEDBACK_INDEX_DOWN_MASK"]
+
+
+def uses_of_the_index(machine):
+    """The directions in which the index is used, and the sources that are captured."""
+    word = machine.feedback_channels[0].word
+    return word[DEFINES["FEEDBACK_INDEX"]] & DIRECTIONS, word[DEFINES["FEEDBACK_CAPTURE_SOURCES"]]
+
+
+@pytest.mark.parametrize(("end", "fields"), [("stop", {}), ("enable", {"on": 0}), ("estop", {})])
+@pytest.mark.parametrize("caught", [False, True])
+def test_a_search_that_is_given_up_leaves_the_index_for_both_directions(end, fields, caught):
+    axis = Axis(position=0, low=-PERIOD if caught else None)
+
+    def give_up(machine):
+        machine.run(10, until=lambda: caught and axis.pressed_low)
+        assert uses_of_the_index(machine) == (DEFINES["FEEDBACK_INDEX_DOWN_MASK"], INDEX)
+        if end == "estop":
+            axis.causes = FAULT["estop"]
+        else:
+            machine.ask(end, axis=0, **fields)
+
+    ended, machine = home(axis, 33, meanwhile=give_up)
+    assert ended == ("ended_by_fault" if end == "estop" else "stopped")
+    assert uses_of_the_index(machine) == (DIRECTIONS, 0)
+
+
+def test_a_search_that_the_planner_refuses_leaves_the_index_for_both_directions():
+    machine = CompiledNode(Axis())
+    machine.set(**{**TRAVEL, "home_method": 34, "profile": 2})
+    machine.set(stepped_border_2=50_000, stepped_border_3=20_000)
+    machine.ask("enable", axis=0, on=1)
+    assert machine.request("home", axis=0)[0] == "stepped_profile_invalid"
+    assert uses_of_the_index(machine) == (DIRECTIONS, 0)
 
 
 def test_the_index_is_gated_by_the_levels_of_the_parameter_and_keeps_its_other_settings():

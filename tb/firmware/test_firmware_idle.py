@@ -60,6 +60,14 @@ def test_it_does_not_wait_while_a_start_at_sync_is_due(machine):
     assert idle_ticks(machine) == 0
 
 
+def test_it_waits_again_after_a_start_at_sync_has_become_void(machine):
+    home(machine)
+    machine.ask("prepare", axis=0, target=20 * PERIOD)
+    machine.ask("start_at_sync", axes=1)
+    machine.ask("stop", axis=0)
+    assert machine.run(100, until=lambda: idle_ticks(machine) == HOLDING)
+
+
 def test_it_does_not_wait_for_a_fine_stage(machine):
     machine.set(0, fine_reach=100)
     home(machine)

@@ -7,7 +7,7 @@ import pytest
 
 from tb.bench import seed
 from twin.compiled.station import TURN, Station
-from twin.compiled.station_devices import ms
+from twin.compiled.station_devices import MOST_TYPED, ms
 from twin.compiled.sub_node import SubNode
 
 STATIONS = 4
@@ -158,8 +158,13 @@ def test_the_station_list_cannot_change_while_a_job_is_under_way():
     assert station.load([5]) == "ok"
 
 
-def test_the_keys_wait_while_a_person_types():
+TYPED = [0, MOST_TYPED]  # bytes of a person so far; their counter saturates
+
+
+@pytest.mark.parametrize("typed", TYPED)
+def test_the_keys_wait_while_a_person_types(typed):
     station = node()
+    station.edm.typed = typed
     station.edm.types_until = station.clk + ms(25_000)
     start(station, "cutting")
     station.run(15_000)
@@ -172,10 +177,12 @@ def test_the_keys_wait_while_a_person_types():
     assert cuts(station) == STATIONS and station.edm.received == station.edm.START * STATIONS
 
 
-def test_the_keys_that_were_sent_wait_while_a_person_types():
+@pytest.mark.parametrize("typed", TYPED)
+def test_the_keys_that_were_sent_wait_while_a_person_types(typed):
     station = node()
     start(station, "cutting")
     assert station.run(5000, until=lambda: station.edm.queue)
+    station.edm.typed = typed
     station.edm.types_until = station.clk + ms(25_000)
     station.run(15_000)
     assert station.job()["state"] == "cutting" and cuts(station) == 0

@@ -138,6 +138,23 @@ def test_a_missing_eeprom_is_reported_and_found_when_it_comes():
     assert station.load(EVENLY) == "ok"
 
 
+def test_an_eeprom_that_fails_for_a_moment_leaves_the_settings_as_they_are():
+    station = powered()
+    limit = SETTING["job_cut_limit"]
+    station.setting(job_cut_limit=77)
+    assert station.load(EVENLY) == "ok"
+    station.setting(job_cut_limit=88)
+    eeprom = station.bus.devices.pop(0x50)
+    assert station.load([1]) == "eeprom_missing"
+    station.bus.devices[0x50] = eeprom
+    assert station.run(4000, until=lambda: station.request("job_begin")[0] == "ok")
+    assert station.station_list() == EVENLY
+    assert station.ask("get_setting", setting=limit)["value"] == 88
+    station.power_cut()
+    station.ready()
+    assert station.ask("get_setting", setting=limit)["value"] == 77
+
+
 def test_a_stuck_bus_is_reported_until_it_is_free():
     station = Station()
     station.bus.stuck = True

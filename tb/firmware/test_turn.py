@@ -11,7 +11,7 @@ from tb.bench import seed
 from twin.compiled.axis import Axis
 from twin.compiled.node import CompiledNode
 from twin.compiled.peripherals import TURN_ARCSEC, PeripheralParts, Sensor, Table
-from twin.compiled.tables import CAUSE, FAULT, TABLE
+from twin.compiled.tables import CAUSE, DEFINES, FAULT, TABLE
 
 PHASE = {code: name for name, (code, _) in TABLE["turn_phase"].items()}
 SETTING = TABLE["setting"]
@@ -194,6 +194,21 @@ def test_a_reading_takes_only_frames_sent_after_the_table_had_settled():
     assert station.state()["reading"] / PER_ARCSEC == pytest.approx(station.table.angle, abs=0.7)
 
 
+def test_the_sensor_is_read_for_ever_though_the_counter_of_its_frames_saturates():
+    station = Station()
+    station.sensor.counted = DEFINES["PERIPHERALS_SENSOR_FRAMES_MASK"]
+    station.run(1000)
+    assert station.ask("sensor")["timed_out"] == 0 and station.sensor.counted <= 1
+    assert station.turn(DEGREE) == "ok"
+
+
+def test_frames_that_came_before_the_start_of_the_firmware_do_not_count():
+    station = Station()
+    station.sensor.counted = 500
+    station.firmware.firmware_start()
+    assert station.ask("sensor")["frames"] == 0
+
+
 # every cause
 
 
@@ -203,6 +218,7 @@ def test_a_sensor_that_never_sent_a_frame_has_timed_out():
     station.run(300)
     assert station.ask("sensor")["timed_out"] == 1
     assert station.begin(DEGREE) == "sensor_timed_out" and station.axes[0].pushed == []
+    assert station.status()["state"] == "off" and not station.axes[0].enabled
 
 
 def test_a_sensor_that_fails_during_a_move_stops_the_table_under_control():

@@ -99,25 +99,35 @@ static bool hold(unsigned n) {
     return a->fine ? axis_ease(n) : !inside;
 }
 
+// Changes the state of the axis, and ends its search for an index, if there is one.
+static void change_state(unsigned n, uint8_t state) {
+    if (HARDWARE_DRIVES) homing_disarm(n);
+    axes[n].state = state;
+}
+
 static void finish(unsigned n, uint8_t cause) {
     struct axis* a = &axes[n];
     a->ended = cause;
-    a->state = BUS_STATE_HOLDING;
+    change_state(n, BUS_STATE_HOLDING);
     a->homing = false;
     a->leaving = pressed(axis_read(n, AXIS_STATE));
     write_control(n, true);
 }
 
-static void fault(unsigned n, uint32_t faults) {
+static void switch_off(unsigned n, uint8_t state, uint8_t cause) {
     struct axis* a = &axes[n];
-    if (faults & BUS_FAULT_ENCODER) a->homed = false;
-    if (a->state == BUS_STATE_FAULTED) return;
-    a->state = BUS_STATE_FAULTED;
+    if (is_busy(a)) a->ended = cause;
+    change_state(n, state);
     a->homing = a->leaving = a->fine = a->near = false;
-    if (is_busy(a)) a->ended = BUS_CAUSE_ENDED_BY_FAULT;
     if (!HARDWARE_DRIVES) return;
     write_control(n, false);
     motion_set_target_to_position(n);
+}
+
+static void fault(unsigned n, uint32_t faults) {
+    struct axis* a = &axes[n];
+    if (faults & BUS_FAULT_ENCODER) a->homed = false;
+    if (a->state != BUS_STATE_FAULTED) switch_off(n, BUS_STATE_FAULTED, BUS_CAUSE_ENDED_BY_FAULT);
 }
 
 void axis_poll(unsigned n) {
@@ -180,11 +190,8 @@ uint8_t axis_enable(unsigned n, bool on) {
     if (on && !hardware_built(n, AXIS_BUILT_DRIVE_MASK)) return BUS_CAUSE_NOT_BUILT;
     axis_poll(n);
     if (!on) {
-        if (is_busy(a)) a->ended = BUS_CAUSE_STOPPED;
-        if (a->state != BUS_STATE_FAULTED) a->state = BUS_STATE_OFF;
-        a->homing = a->leaving = a->fine = a->near = false;
-        write_control(n, false);
-        motion_set_target_to_position(n);
+        switch_off(n, a->state == BUS_STATE_FAULTED ? BUS_STATE_FAULTED : BUS_STATE_OFF,
+                   BUS_CAUSE_STOPPED);
         return BUS_CAUSE_OK;
     }
     if (a->state == BUS_STATE_FAULTED) return BUS_CAUSE_FAULTED;
@@ -217,7 +224,10 @@ uint8_t axis_home(unsigned n) {
     hand_over(n, false);
     feedback_write(n, FEEDBACK_SEGMENT_USE, 0);  // homing needs phases; the target moves along
     cause = homing_begin(n);
-    if (cause != BUS_CAUSE_OK) return cause;
+    if (cause != BUS_CAUSE_OK) {
+        homing_disarm(n);
+        return cause;
+    }
     a->homed = false;
     a->ended = BUS_CAUSE_RUNNING;
     a->state = BUS_STATE_HOMING;
@@ -259,16 +269,21 @@ static void begin_motion(unsigned n) {
     axes[n].state = BUS_STATE_MOVING;
 }
 
+uint32_t axis_prepared(unsigned count, uint32_t mask) {
+    for (unsigned n = 0; n < count; n++)
+        if (axes[n].state != BUS_STATE_PREPARED) mask &= ~(1u << n);
+    return mask;
+}
+
 uint8_t axis_may_start(unsigned count, uint32_t mask) {
     if (mask == 0 || mask >> count) return BUS_CAUSE_OUT_OF_RANGE;
-    for (unsigned n = 0; n < count; n++)
-        if (mask >> n & 1u && axes[n].state != BUS_STATE_PREPARED) return BUS_CAUSE_NOT_PREPARED;
-    return BUS_CAUSE_OK;
+    return axis_prepared(count, mask) == mask ? BUS_CAUSE_OK : BUS_CAUSE_NOT_PREPARED;
 }
 
 void axis_started(unsigned count, uint32_t mask) {
+    mask = axis_prepared(count, mask);
     for (unsigned n = 0; n < count; n++)
-        if (mask >> n & 1u && axes[n].state == BUS_STATE_PREPARED) begin_motion(n);
+        if (mask >> n & 1u) begin_motion(n);
 }
 
 uint8_t axis_start_prepared(unsigned count, uint32_t mask) {
@@ -308,7 +323,7 @@ uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id) {
 
 void axis_break_off(unsigned n, uint8_t cause) {
     motion_controlled_stop(n);
-    axes[n].state = BUS_STATE_STOPPING;
+    change_state(n, BUS_STATE_STOPPING);
     stop_causes[n] = cause;
 }
 
@@ -401,8 +416,12 @@ uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value) {
     if (cause != BUS_CAUSE_OK) return cause;
     axis_poll(n);
     cause = check_parameter(n, id, value);
-    if (cause == BUS_CAUSE_OK) parameters_set(n, id, value);
-    return cause;
+    if (cause != BUS_CAUSE_OK) return cause;
+    if ((id == BUS_PARAMETER_DECODER_MODE || id == BUS_PARAMETER_POSITION_SOURCE) &&
+        value != parameters_get(n, id))
+        axes[n].homed = false;  // the zero was another count
+    parameters_set(n, id, value);
+    return BUS_CAUSE_OK;
 }
 
 uint8_t axis_state(unsigned n) { return axes[n].state; }

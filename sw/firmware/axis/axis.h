@@ -35,6 +35,7 @@ uint8_t axis_prepare(unsigned n, int64_t target, uint32_t* duration_ticks);
 uint8_t axis_start_prepared(unsigned count, uint32_t mask);
 uint8_t axis_may_start(unsigned count, uint32_t mask);  // the check alone
 void axis_started(unsigned count, uint32_t mask);       // the hardware has started them
+uint32_t axis_prepared(unsigned count, uint32_t mask);  // those of the axes that wait for a start
 
 uint8_t axis_stop(unsigned n);  // controlled stop; always ok
 // Begins a controlled stop of a motion in progress, which then ends with this cause.
@@ -48,6 +49,7 @@ bool axis_ease(unsigned n);  // meanwhile: open_command slowly becomes 0; true w
 uint8_t axis_reset_faults(unsigned n);
 
 // Returns the causes of parameters_check, and busy for a parameter that must not change now.
+// Another decoder_mode or position_source invalidates the zero.
 uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value);
 
 // Changes with each request to switch off, home, move, prepare or stop; wraps.

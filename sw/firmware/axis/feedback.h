@@ -11,7 +11,8 @@
 // Clears the latched signal faults; those whose cause persists are latched again at once.
 void feedback_clear_signal_faults(unsigned n);
 
-// Writes one of the registers that the host may write: index, capture and compare.
+// Writes one of the registers that the host may write: index, capture and compare. A word of a wide
+// register is in force at once.
 // Returns a bus_cause: no_such_register for all others, out_of_range for strobes of the firmware.
 uint8_t feedback_write_register(uint32_t offset, unsigned n, uint32_t value);
 

@@ -127,6 +127,7 @@ static void take_index(unsigned n, uint32_t directions) {
 // over it before it starts.
 static void arm(unsigned n, bool up) {
     homings[n].up = up;
+    homings[n].step = SEEK;
     take_index(n, up ? FEEDBACK_INDEX_UP_MASK : FEEDBACK_INDEX_DOWN_MASK);
     feedback_write(n, FEEDBACK_CAPTURE_SOURCES, CAPTURE_INDEX);
     feedback_write(n, FEEDBACK_STROBES,
@@ -139,7 +140,9 @@ static uint8_t seek(unsigned n, bool up, int64_t distance) {
     return drive(n, SEEK, up ? distance : -distance, BUS_PARAMETER_HOMING_SEARCH_SPEED);
 }
 
-static void disarm(unsigned n) {
+void homing_disarm(unsigned n) {
+    if (homings[n].step != SEEK && homings[n].step != SEEK_CAUGHT) return;
+    homings[n].step = MET;
     feedback_write(n, FEEDBACK_CAPTURE_SOURCES, 0);
     feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK);
     take_index(n, FEEDBACK_INDEX_UP_MASK | FEEDBACK_INDEX_DOWN_MASK);
@@ -147,7 +150,6 @@ static void disarm(unsigned n) {
 
 static uint8_t not_met(unsigned n) {
     struct homing* h = &homings[n];
-    disarm(n);
     if (method_of(n) != S3_METHOD || h->second) return BUS_CAUSE_NO_INDEX;
     h->second = true;
     return seek(n, false, 2 * distance_of(n));
@@ -201,7 +203,7 @@ static uint8_t opened(unsigned n) {
     struct homing* h = &homings[n];
     if (method_of(n) == 1 || method_of(n) == 2) {  // continue, now searching the index
         arm(n, !at_high_end(n));
-        return go(n, SEEK);
+        return BUS_CAUSE_RUNNING;
     }
     // The switch has opened between two polls: in the middle between their positions, on average.
     h->zero_position = (h->sampled + axis_read_position(n, AXIS_POSITION)) >> 1;
@@ -221,7 +223,7 @@ static uint8_t seek_poll(unsigned n, uint32_t state) {
     struct homing* h = &homings[n];
     if (FIELD_GET(feedback_read(n, FEEDBACK_CAPTURE_STATE), FEEDBACK_CAPTURE_STATE_PRESENT)) {
         h->zero_position = (int64_t)(feedback_read_wide(n, FEEDBACK_CAPTURED_POSITION) << 16) >> 16;
-        disarm(n);
+        homing_disarm(n);
         motion_controlled_stop(n);
         return go(n, MET);
     }
@@ -260,9 +262,13 @@ uint8_t homing_poll(unsigned n, uint32_t state) {
         if (!motion_played(n)) return BUS_CAUSE_RUNNING;
         if (method_of(n) != S3_METHOD || (h->up && h->zero_position - h->sampled >= CLEAR_DISTANCE))
             return go(n, FIRST_SETTLE);
-        return drive(n, RETURN, h->zero_position - distance / 8 - target,
+        distance /= 8;
+        if (distance < 2 * CLEAR_DISTANCE) distance = 2 * CLEAR_DISTANCE;
+        return drive(n, RETURN, h->zero_position - distance - target,
                      BUS_PARAMETER_HOMING_SEARCH_SPEED);
-    case RETURN: return motion_played(n) ? seek(n, true, distance / 4) : BUS_CAUSE_RUNNING;
+    case RETURN:
+        return motion_played(n) ? seek(n, true, 2 * (h->zero_position - target))
+                                : BUS_CAUSE_RUNNING;
     case FIRST_SETTLE:
         caught = motion_settle(n, true, settle_window(n));
         if (caught != BUS_CAUSE_OK) return caught;

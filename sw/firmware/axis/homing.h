@@ -14,6 +14,10 @@ uint8_t homing_begin(unsigned n);
 // cause of the failure: no_switch, switch_stuck, no_index, not_settled.
 uint8_t homing_poll(unsigned n, uint32_t state);
 
+// Ends the search for an index, if there is one: the index is used in both directions again. To be
+// called whenever a homing has ended or was refused.
+void homing_disarm(unsigned n);
+
 // Position that the last homing found, relative to the zero that it chose, in 2^-16 period.
 int32_t homing_phase(unsigned n);
 

@@ -12,6 +12,7 @@
 #define COEFFICIENTS 5u  // of a filter
 #define MOST_SAMPLES AXIS_SENSING_DEGLITCH_MASK
 #define FILTERS 2u  // with parameters
+#define LONGEST_DAC_HALF_PERIOD (ACTUATOR_DAC_HALF_PERIOD_MASK >> ACTUATOR_DAC_HALF_PERIOD_SHIFT)
 
 #define LIMITS(name, id, low, high, value) [id] = {low, high, value},
 
@@ -135,13 +136,17 @@ static void apply_steps(unsigned axis) {
     actuator_write_wide(axis, ACTUATOR_STEP_RATIO, (uint64_t)p[BUS_PARAMETER_STEPS_PER_PERIOD]);
 }
 
+// Cycles of half a period of the DAC clock, rounded up.
+static uint32_t dac_half_period(int64_t clock) {
+    uint32_t halves = 2u * (uint32_t)clock;
+    return (node_read(NODE_CLK_HZ) + halves - 1u) / halves;
+}
+
 static void apply_dac(unsigned axis) {
-    const int64_t* p = parameters[axis];
-    uint64_t halves = 2u * (uint64_t)p[BUS_PARAMETER_DAC_CLOCK],
-             half_period = (node_read(NODE_CLK_HZ) + halves - 1u) / halves;
-    actuator_write(axis, ACTUATOR_DAC,
-                   FIELD_PUT(ACTUATOR_DAC_HALF_PERIOD, saturate(half_period, 0xFF)) |
-                       FIELD_PUT(ACTUATOR_DAC_REFRESH, 0xFFFF));
+    uint32_t half_period = dac_half_period(parameters[axis][BUS_PARAMETER_DAC_CLOCK]);
+    actuator_write(
+        axis, ACTUATOR_DAC,
+        FIELD_PUT(ACTUATOR_DAC_HALF_PERIOD, half_period) | FIELD_PUT(ACTUATOR_DAC_REFRESH, 0xFFFF));
 }
 
 static void apply_pwm(unsigned axis) {
@@ -257,6 +262,8 @@ uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value) {
     if (id == BUS_PARAMETER_HOME_METHOD && !home_method_exists(value))
         return BUS_CAUSE_OUT_OF_RANGE;
     if (value < table[id].low || value > table[id].high) return BUS_CAUSE_OUT_OF_RANGE;
+    if (id == BUS_PARAMETER_DAC_CLOCK && dac_half_period(value) > LONGEST_DAC_HALF_PERIOD)
+        return BUS_CAUSE_OUT_OF_RANGE;
     return is_built(axis, id, value) ? BUS_CAUSE_OK : BUS_CAUSE_NOT_BUILT;
 }
 

@@ -167,7 +167,7 @@ static bool of_axis(uint32_t block, uint32_t base) {
 
 // Reading these registers would take data from the firmware.
 static bool has_read_effect(uint32_t address) {
-    return address == BUS_BASE + BUS_RECEIVE ||
+    return address == BUS_BASE + BUS_RECEIVE || address == NODE_BASE + NODE_SCOPE_WORD ||
            address == PERIPHERALS_BASE + PERIPHERALS_I2C_ANSWER ||
            address == PERIPHERALS_BASE + PERIPHERALS_PEER_RECEIVE;
 }
@@ -236,7 +236,8 @@ static uint8_t set_baud(void) {
     return BUS_CAUSE_OK;
 }
 
-// The hardware starts the axes; the firmware detects it by the count of syncs.
+// The hardware starts the axes; the firmware detects it by the count of syncs. An axis that is no
+// longer prepared does not wait for a sync any more.
 static uint8_t start_at_sync(uint32_t mask) {
     uint8_t cause = mask ? axis_may_start(axes, mask) : BUS_CAUSE_OK;
     if (cause != BUS_CAUSE_OK) return cause;
@@ -247,10 +248,15 @@ static uint8_t start_at_sync(uint32_t mask) {
 }
 
 static __attribute__((noinline)) void poll_sync(void) {
-    if (!HARDWARE_DRIVES || !sync_axes || bus_read(BUS_SYNCS) == syncs) return;
-    bus_write(BUS_SYNC_AXES, 0);
-    axis_started(axes, sync_axes);
-    sync_axes = 0;
+    if (!HARDWARE_DRIVES || !sync_axes) return;
+    uint32_t waiting = axis_prepared(axes, sync_axes);
+    if (bus_read(BUS_SYNCS) != syncs) {
+        axis_started(axes, waiting);
+        waiting = 0;
+    }
+    if (waiting == sync_axes) return;
+    bus_write(BUS_SYNC_AXES, waiting);
+    sync_axes = waiting;
 }
 
 static bool is_of_drive(uint8_t operation) {

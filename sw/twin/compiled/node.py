@@ -18,6 +18,7 @@ from twin.compiled.tables import (
     DEFINES,
     END_OF_MAP,
     FLAG,
+    LOW_WORDS,
     PARAMETER,
     PERIOD,
     SOFTWARE,
@@ -100,6 +101,7 @@ class CompiledNode:
         self.received: deque[int] = deque()
         self.sent: list[int] = []
         self.word: dict[int, int] = {}
+        self.low_word = 0  # the low word that was written last, of whichever register
         self.link: dict[int, int] = {}  # registers of the real-time link by their offsets
         self.crc_bytes = b""
         self.sequence = 0
@@ -162,7 +164,16 @@ class CompiledNode:
         }.get(offset, self.word.get(offset, 0))
 
     def write(self, offset: int, value: int) -> None:
-        """Write a register, as the firmware does."""
+        """Write a register, as the firmware does. A low word waits for the next high one."""
+        if offset in LOW_WORDS:
+            self.low_word = value
+            return
+        if offset - 4 in LOW_WORDS:
+            self.store(offset - 4, self.low_word)
+        self.store(offset, value)
+
+    def store(self, offset: int, value: int) -> None:
+        """Write a word of a register."""
         d = DEFINES
         if offset >= END_OF_MAP:
             if self.flash:

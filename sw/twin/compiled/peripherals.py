@@ -129,6 +129,7 @@ class Sensor:
         self.ms, self.before = 0, deque([table.angle] * 3, maxlen=3)
         self.word, self.sent_clk, self.clk, self.latched = 0, 0, 0, 0
         self.frames, self.missed, self.wrong = 0, 0, 0
+        self.counted = 0  # good frames, by the counter of the hardware
         self.dead = self.stuck = False
 
     def reading(self, angle: float) -> float:
@@ -152,6 +153,7 @@ class Sensor:
             self.wrong += chance >= self.lost
             return
         self.frames, self.sent_clk = self.frames + 1, machine.clk - CLK_MS
+        self.counted = min(self.counted + 1, DEFINES["PERIPHERALS_SENSOR_FRAMES_MASK"])
         if not self.stuck:
             self.word = round(self.reading(self.before[0]) / TURN_ARCSEC * 2**32) % 2**32
 
@@ -162,7 +164,7 @@ class Sensor:
             self.latched = self.clk - self.sent_clk
             return self.word
         return {
-            d["PERIPHERALS_SENSOR_FRAMES"]: self.frames,
+            d["PERIPHERALS_SENSOR_FRAMES"]: self.counted,
             d["PERIPHERALS_SENSOR_READING_HIGH"]: self.latched,
             d["PERIPHERALS_SENSOR_ERRORS"]: min(self.wrong, 255)
             << d["PERIPHERALS_SENSOR_ERRORS_CRC_SHIFT"]
@@ -176,6 +178,8 @@ class Sensor:
             and value & DEFINES["PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK"]
         ):
             self.missed = self.wrong = 0
+        if offset == DEFINES["PERIPHERALS_SENSOR_FRAMES"]:
+            self.counted = 0
 
 
 class PeerPort:

@@ -116,6 +116,8 @@ class Station(CompiledNode):
         elif at == d["PERIPHERALS_PS2_STATE"]:
             if value & d["PERIPHERALS_PS2_STATE_DROP_MASK"]:
                 self.edm.take_back()
+        elif at == d["PERIPHERALS_PS2_TYPED"]:
+            self.edm.typed = 0
         elif at == d["PERIPHERALS_PS2_INJECT"]:
             self.edm.queue.append((value & 0xFF, value >> 8 & 1))
         elif at == d["PERIPHERALS_EDM_STATUS"]:

@@ -11,6 +11,7 @@ from twin.compiled.tables import CLK_HZ, DEFINES
 
 BYTE_CLK, EDGE_CLK = CLK_HZ * 9 // 100_000, CLK_HZ // 100_000  # at 100 kHz
 OK, NOT_ACKNOWLEDGED, NO_BUS = 0, 1, 3
+MOST_TYPED = DEFINES["PERIPHERALS_PS2_TYPED_MASK"]
 KEYS = (
     "7 8 9 START PAUSE RESUME STOP "
     "4 5 6 AGAIN NEXT UP DOWN "
@@ -310,7 +311,7 @@ class Edm:
     def work(self, now: int) -> None:
         """What has happened until now."""
         if now < self.types_until:
-            self.typed, self.quiet_since = self.typed + 1, now
+            self.typed, self.quiet_since = min(self.typed + 1, MOST_TYPED), now
         free = now - self.quiet_since > self.IDLE and not self.takes_nothing
         if self.queue and (free or self.injecting) and now >= self.next_key:
             byte, last = self.queue.popleft()

@@ -24,6 +24,14 @@ FLAG = {name: 1 << bit for name, (bit, _) in TABLE["flag"].items()}
 PARAMETER = TABLE["parameter"]
 CLK_HZ = 4_000_000
 PERIOD = 65536
+LOW_WORDS = {  # addresses of those that wait until their high words are written
+    base + DEFINES[f"{block}_BASE"] + offset
+    for block in ("AXIS", "FEEDBACK", "ACTUATOR")
+    for base in range(0, DEFINES["FEEDBACK_BASE"] - DEFINES["AXIS_BASE"], DEFINES["AXIS_STRIDE"])
+    for name, offset in DEFINES.items()
+    if name.startswith(block) and name.endswith("_LOW")
+    if DEFINES.get(f"{name.removesuffix('_LOW')}_HIGH") == offset + 4
+}
 INDEX, SOFTWARE = 1 << 0, 1 << 2  # bits of capture_sources
 END_OF_MAP = 1 << 16  # the port of the flash begins here
 

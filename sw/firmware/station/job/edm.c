@@ -24,7 +24,7 @@ static const uint8_t start_keys[] = {0x14, 0x1D, 0xF0,
                                      0x1D, 0xF0, 0x14};  // left Ctrl and W, pressed and released
 
 static uint8_t state, cause;
-static uint32_t since_ms, begun_ms, typed;
+static uint32_t since_ms, begun_ms;
 
 static uint32_t status(void) { return peripherals_read(PERIPHERALS_EDM_STATUS); }
 
@@ -83,11 +83,18 @@ void edm_start(unsigned axes) {
     go(EDM_IDLE);
 }
 
+// Whether somebody has typed since the last call. The count of the hardware saturates.
+static bool person_types(void) {
+    bool types = peripherals_read(PERIPHERALS_PS2_TYPED);
+    if (types) peripherals_write(PERIPHERALS_PS2_TYPED, 0);
+    return types;
+}
+
 void edm_begin(void) {
     if (edm_alarm()) return fail(BUS_CAUSE_EDM_ALARM);
     if (!edm_at_rest()) return fail(BUS_CAUSE_EDM_BUSY);
     peripherals_write(PERIPHERALS_EDM_STATUS, PERIPHERALS_EDM_STATUS_ROSE_1_MASK);
-    typed = peripherals_read(PERIPHERALS_PS2_TYPED);
+    person_types();  // only what is typed from now on counts
     go(EDM_QUIET);
 }
 
@@ -108,13 +115,6 @@ void edm_follow(void) {
 void edm_release(void) {
     take_keys_back();
     go(EDM_IDLE);
-}
-
-static bool person_types(void) {
-    uint32_t now = peripherals_read(PERIPHERALS_PS2_TYPED);
-    bool types = now != typed;
-    typed = now;
-    return types;
 }
 
 void edm_work(void) {

@@ -93,7 +93,7 @@ static void take_part(void) {
 static void choose(void) {
     record_copies_choose(&copies);
     const struct list* list = in_force();
-    if (list->generation > value_store_status()->generation)
+    if (store_powering_up() && list->generation > value_store_status()->generation)
         for (uint8_t id = 1; id <= BUS_SETTING_COUNT; id++) settings_set(id, list->setting[id - 1]);
     store_loaded(list->generation                     ? BUS_CAUSE_OK
                  : copies.blank[0] && copies.blank[1] ? BUS_CAUSE_NO_JOB

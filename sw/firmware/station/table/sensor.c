@@ -16,7 +16,7 @@
 #define CHARACTER_BITS 10u
 
 static uint32_t cycles_per_ms;
-static uint32_t frames;    // good ones
+static uint32_t frames;    // good ones since the start
 static uint32_t fresh_ms;  // when the last of them was sent; at first, the start
 static uint32_t word;      // its angle, 2^-32 turn
 static uint32_t changes;
@@ -37,14 +37,14 @@ void sensor_start(unsigned axes) {
     uint32_t clk_hz = node_read(NODE_CLK_HZ);
     (void)axes;
     cycles_per_ms = clk_hz / 1000u;
-    frames = peripherals_read(PERIPHERALS_SENSOR_FRAMES);
     fresh_ms = clock_ms();
-    word = changes = wrong_crc = broken = missed = 0;
+    frames = word = changes = wrong_crc = broken = missed = 0;
     measurement = (struct measurement){0};
     peripherals_write(PERIPHERALS_SENSOR_BIT_TIME,
                       (uint32_t)((16 * (uint64_t)clk_hz + BAUD / 2) / BAUD));
     peripherals_write(PERIPHERALS_SENSOR_GAP, clk_hz / BAUD * CHARACTER_BITS * GAP_CHARACTERS);
     peripherals_write(PERIPHERALS_SENSOR_ERRORS, PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK);
+    peripherals_write(PERIPHERALS_SENSOR_FRAMES, 0);
 }
 
 // Must be called before the counters of the hardware saturate.
@@ -66,10 +66,11 @@ static void measure(void) {
 }
 
 void sensor_work(void) {
-    uint32_t now = peripherals_read(PERIPHERALS_SENSOR_FRAMES);
-    if (now == frames) return;
+    uint32_t arrived = peripherals_read(PERIPHERALS_SENSOR_FRAMES);
+    if (arrived == 0) return;
+    peripherals_write(PERIPHERALS_SENSOR_FRAMES, 0);  // the count of the hardware saturates
     uint64_t reading = peripherals_read_wide(PERIPHERALS_SENSOR_READING);
-    frames = now;
+    frames += arrived;
     changes += word != (uint32_t)reading;
     word = (uint32_t)reading;
     fresh_ms = clock_ms() - (uint32_t)(reading >> 32) / cycles_per_ms;

@@ -228,10 +228,10 @@ uint8_t turn_to(uint32_t angle) {
     if (!sensor_built()) return BUS_CAUSE_NOT_BUILT;
     if (angle >= SENSOR_TURN) return BUS_CAUSE_OUT_OF_RANGE;
     if (turn.phase != BUS_TURN_PHASE_IDLE) return BUS_CAUSE_BUSY;
+    if (sensor_timed_out()) return BUS_CAUSE_SENSOR_TIMED_OUT;
     cause = axis_enable(AXIS, true);
     if (cause != BUS_CAUSE_OK) return cause;
     if (axis_ended(AXIS) == BUS_CAUSE_RUNNING) return BUS_CAUSE_BUSY;
-    if (sensor_timed_out()) return BUS_CAUSE_SENSOR_TIMED_OUT;
     turn = (struct turn){
         .ended = BUS_CAUSE_RUNNING, .target = angle, .command_count = axis_command_count(AXIS)};
     read_angle();
