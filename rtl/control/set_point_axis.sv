@@ -6,10 +6,10 @@
 // rate      one strobe of each kind per cycle
 // behaviour A stream begins when the axis is allowed to, at rest. After an end it begins again when
 //           `allowed` has fallen in between. `ahead` counts the ticks that the queued pieces still
-//           take: from the tick in which the engine takes the first piece on. A stream ends at once
-//           when the drive is off, when the registers stop the axis, and when the engine stops by
-//           itself because a piece is missing. stop_due then asks for a controlled stop, so that
-//           nothing of the stream stays in the queue of the engine.
+//           take, 17 * 255 at most: from the tick in which the engine takes the first piece on. A
+//           stream ends at once when the drive is off, when the registers stop the axis, and when
+//           the engine stops by itself because a piece is missing. stop_due then asks for a
+//           controlled stop, so that nothing of the stream stays in the queue of the engine.
 // source    docs/stream.md
 // model     tb/control/set_point_axis.py, equal in every bit of every cycle
 // proved    Without a level of begins or active, nothing of the axis may be queued. Every end but a
@@ -57,7 +57,7 @@ module set_point_axis #(
     output logic        stop_due,     // level: a controlled stop is to be requested
     output logic        full,         // level: the queue of the engine has no room
     output logic        streamed,     // level: the segments of the axis are pieces
-    output logic [11:0] ahead,        // ticks from the last tick to the end of the last piece
+    output logic [12:0] ahead,        // ticks from the last tick to the end of the last piece
     // for the registers
     output logic [31:0] state,        // stream_state
     output logic [31:0] counts        // stream_counts
@@ -85,7 +85,7 @@ module set_point_axis #(
     assign active   = starting || anchored;
     assign started  = mode == STREAMING || mode == EXTRAPOLATING;
     assign begins   = allowed && mode == OFF && !starting && !stop_due && resting;
-    assign ending    = ahead <= 12'(MARGIN);
+    assign ending    = ahead <= 13'(MARGIN);
     assign full     = in_queue == DEPTH;
     assign streamed = active || stop_due;
     assign state    = {extrapolated, 2'd0, room[5] ? 5'd0 : room[4:0], refusal, ended, mode};
@@ -96,7 +96,7 @@ module set_point_axis #(
             in_queue <= queued;
             resting  <= !moving && queued == '0;
         end
-        ahead          <= ahead + (pushed ? 12'(ticks) : 12'd0) - 12'(tick && ahead != '0);
+        ahead          <= ahead + (pushed ? 13'(ticks) : 13'd0) - 13'(tick && ahead != '0);
         accepted_count <= accepted_count + 16'(accepted);
         late_count     <= late_count + 8'(late);
         refused_count  <= refused_count + 8'(refused && !late) + 8'(dropped);
@@ -118,7 +118,7 @@ module set_point_axis #(
         if (takes) begin
             starting <= 1'b0;
             mode     <= PREPARED;
-            ahead    <= 12'(HOLD);
+            ahead    <= 13'(HOLD);
         end
         if (began) begin
             starting <= 1'b1;
@@ -156,7 +156,7 @@ module set_point_axis #(
             if ($past(active) && !active) assert ($past(released) || (stop_due && mode == ENDED));
             if (accepted_count != $past(accepted_count)) assert ($past(accepted || began));
             if (stop_due && !$past(stop_due)) assert (due && mode == ENDED && ended != NOT_ENDED);
-            if (mode == PREPARED && $past(mode) == OFF) assert (ahead == 12'(HOLD));
+            if (mode == PREPARED && $past(mode) == OFF) assert (ahead == 13'(HOLD));
             if (mode == OFF && $past(mode) == ENDED) assert ($past(!allowed));
             assert (!(starting && mode != OFF));
         end

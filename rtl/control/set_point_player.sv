@@ -108,13 +108,13 @@ module set_point_player #(
     wire  [        1:0] waiting;
     wire  [       31:0] commit_tick;
     wire  [       47:0] stored;
-    wire  [12*AXES-1:0] ahead;
-    logic [       11:0] ahead_here;
+    wire  [13*AXES-1:0] ahead;
+    logic [       12:0] ahead_here;
     always_comb begin
         ahead_here = '0;
         for (int n = 0; n < AXES; n++) begin
             here[n]    = axis == 3'(n);
-            ahead_here = ahead_here | (ahead[12*n+:12] & {12{here[n]}});
+            ahead_here = ahead_here | (ahead[13*n+:13] & {13{here[n]}});
         end
     end
     wire                due_scan = |(8'(due) & (8'd1 << scan));
@@ -192,7 +192,7 @@ module set_point_player #(
         && late_next > {1'b0, late_limit};
     wire no_drive = looks && !stops_here && begins_here && !is_enabled;
     wire begins_now = looks && !stops_here && begins_here && is_enabled;
-    wire releases = looks && !stops_here && is_anchored && !is_allowed && rests;
+    wire releases = looks && !stops_here && is_anchored && !is_allowed && rests && !(|(full & here));
     wire continues = looks && !stops_here && is_anchored && is_allowed && is_ending && !is_late;
     wire fetch_ends = phase == FETCH && fetched == 3'd6;
     wire withdrawn = phase == OFFER && !is_active;
@@ -388,14 +388,14 @@ module set_point_player #(
                 .stop_due   (stop_due[n]),
                 .full       (full[n]),
                 .streamed   (streamed[n]),
-                .ahead      (ahead[12*n+:12]),
+                .ahead      (ahead[13*n+:13]),
                 // for the registers
                 .state      (states[32*n+:32]),
                 .counts     (counts[32*n+:32])
             );
         end else begin : g_not_built
             assign {begins[n], active[n], anchored[n], started[n], ending[n]} = '0;
-            assign {due[n], stop_due[n], full[n], streamed[n], ahead[12*n+:12]} = '0;
+            assign {due[n], stop_due[n], full[n], streamed[n], ahead[13*n+:13]} = '0;
             assign {states[32*n+:32], counts[32*n+:32]} = '0;
 
             wire unused = &{1'b0, enabled[n], stops[n], dropped[n]};

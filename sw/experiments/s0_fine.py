@@ -34,7 +34,7 @@ from twin.machines.machine import Trace
 from twin.nodes.twin import drives
 
 REQUIRED_NM = 10.0  # the aim of the paper
-NODE = {**WITH_SEGMENTS, **drives("HAS_BRIDGE", "HAS_DAC", "HAS_FINE_STAGE")}
+NODE = {**WITH_SEGMENTS, "FILTERS": 2, **drives("HAS_BRIDGE", "HAS_DAC", "HAS_FINE_STAGE")}
 FINE: Mapping[str, str | float] = {
     # 9 Hz; with twice this gain the mode of the flexure at 500 Hz (Q = 25) would oscillate
     "fine_ki": 20000 / 2**24,

@@ -355,7 +355,7 @@ def twin_sde_nm(complete: bool = True, seed: int = 1) -> float:
     from nothing to the harmonics; or, if not complete, to the first correction that it accepts.
     """
     left: dict[int, float] = {}  # nm by how much was accepted: nothing, the ellipse, the harmonics
-    with Twin(nodes=(1,), plant=HARMONICS_OF_TWIN) as twin:
+    with Twin(nodes=(1,), seed=seed, plant=HARMONICS_OF_TWIN) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed))
         twin.run_until_ready()
         axis = bus.axis(1)

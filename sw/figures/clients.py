@@ -175,8 +175,8 @@ FIGURES = {
     "clients_killed_unsafe": Figure(
         clients_killed_unsafe,
         "clients",
-        f"of {CLIENTS} clients of a served twin, ended in mid-motion by {', '.join(WAYS)}: axis "
-        f"not stopped under control within {1000 * LATE_S:.0f} ms, drive not off afterwards, or a "
+        f"of {CLIENTS} clients of a served twin, ended in mid-motion by {', '.join(WAYS)}: stop "
+        f"under control not begun within {1000 * LATE_S:.0f} ms, drive not off afterwards, or a "
         "fault left",
         "0",
         Quick(

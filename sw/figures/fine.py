@@ -127,7 +127,7 @@ FIGURES = {
         s0_fine_nm_max,
         "nm",
         "largest |target - true position| of 100 random moves (0.1 um to 2 mm), motor and piezo, "
-        "each axis from its own zero; a perfect scale, no vibration, no drift",
+        "the X axis from its own zero; a perfect scale, no vibration, no drift",
         "<= 5",
         FEW,
         2,

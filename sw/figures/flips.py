@@ -346,6 +346,11 @@ def memory_bits(
         yield one, source.randrange(one.words), source.randrange(one.bits)
 
 
+def common_seed(part: int, seed: int) -> int:
+    """A seed that all parts of a campaign share: the seeds of its parts follow each other."""
+    return seed - part
+
+
 def flips(
     name: str, part: int, parts: int, seed: int, at_once: int = 1, most: int | None = None
 ) -> Iterator[tuple[Flip, str, str]]:
@@ -357,7 +362,7 @@ def flips(
     if reference is None or reference.error:
         raise RuntimeError(f"{name}: the motion without a flip fails: {reference}")
     bits = bits_of(session.registers)
-    random.Random(parts).shuffle(bits)
+    random.Random(common_seed(part, seed)).shuffle(bits)
     chosen = bits[part::parts][:most]
     chosen += memory_bits(session.registers, round(len(chosen) * MEMORY_SHARE), source)
     jobs = [Flip(*one, source.uniform(0.0, reference.took_s[0])) for one in chosen]
@@ -463,7 +468,7 @@ def protection_flips(
     session = machine.power_up(seed)
     round_of_firmware(len(session.axes))  # once, before the copies
     tried = [(bit, cause) for bit in protection_bits(session.registers) for cause in STOPS]
-    random.Random(parts).shuffle(tried)
+    random.Random(common_seed(part, seed)).shuffle(tried)
     jobs = []
     for bit, cause in tried[part::parts][:most]:
         late_s = 0.0 if cause == "core" else STOPS[cause].within_s(session) / 2

@@ -284,7 +284,8 @@ FIGURES = {
         guard_failures,
         "faults",
         "of 10^4 faults in random cycles, 300 of them in the whole node: drive not off within a "
-        "servo tick, wrong first cause or position, or reset without a person",
+        "servo tick, wrong first cause or position, or reset without a person; 100 of the 300 stop "
+        "the soft core: drive not off within its watchdog, or on again",
         "0",
         Quick({"faults": 208, "in_node": 3, "in_core": 1}, "208 faults, 4 of them in the node"),
         0,

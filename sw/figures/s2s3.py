@@ -140,7 +140,7 @@ FIGURES = {
         s3_zero_um_max,
         "um",
         "spread of the zero of a linear motor over 1000 searches from anywhere within 1 mm, in "
-        "counts of 1 um, the index in the middle of a count with +-0.05 um of scatter",
+        "counts of 1 um, the index a quarter of a count behind an edge with +-0.05 um of scatter",
         "0",
         Quick({"count": 20}, "20 searches"),
         1,

@@ -139,8 +139,10 @@ class Configuration:
         return min(round(self.delay_ms + 1e3 * (LATE_S + stop_s)), LONGEST_WATCHDOG_MS)
 
 
-def backlash_of(row: Table, table: Table) -> tuple[float, float]:
-    """The backlash of an axis in um, and the velocity in mm/s with which it is taken up."""
+def backlash_of(row: Table, table: Table, sensor: str) -> tuple[float, float]:
+    """The backlash of an axis with its sensor on this side of it, in um, and the velocity in mm/s
+    with which it is taken up.
+    """
     backlash, take_up = table.take("backlash_um", float, 0.0), table.take("take_up", float, 1.0)
     if backlash < 0 or take_up <= 0:
         raise table.misfit(
@@ -149,6 +151,11 @@ def backlash_of(row: Table, table: Table) -> tuple[float, float]:
         )
     if backlash and "backlash" not in row.left.get("features", []):
         raise table.misfit("backlash_um needs the feature backlash of the axis")
+    if backlash and sensor == "table" and "stepper" not in row.left.get("drives", []):
+        raise table.misfit(
+            'backlash_um needs a stepper, or sensor = "motor": a servo with its sensor on the '
+            "table takes the backlash up itself"
+        )
     return backlash, take_up
 
 
@@ -164,7 +171,7 @@ def second_side(row: Table, joints: Sequence[Joint]) -> Joint:
     period, apart = table.take("period_um", float, first.period_um), table.take("apart_um", float)
     if period <= 0 or apart <= 0:
         raise table.misfit(f"period_um {period:g} and apart_um {apart:g} must be above 0")
-    backlash, take_up = backlash_of(row, table)
+    backlash, take_up = backlash_of(row, table, first.sensor)
     table.close()
     return replace(
         first,
@@ -195,11 +202,11 @@ def joint_of(row: Table, number: int, behind_ms: float) -> Joint:
     rest = table.take("rest", float, 0.0)
     if not low <= rest <= high:
         raise table.misfit(f"rest {rest:g} is outside the travel, {low:g} to {high:g}")
-    backlash, take_up = backlash_of(row, table)
     hysteresis = table.take("hysteresis_um", float, values["period_um"] / 16)
     sensor = table.take("sensor", str, "table")
     if sensor not in ("table", "motor"):
         raise table.misfit(f"sensor {sensor!r} is none of table, motor")
+    backlash, take_up = backlash_of(row, table, sensor)
     sequence = table.take("home_sequence", int, number)
     if sequence < 0:
         raise table.misfit(f"home_sequence {sequence} must not be below 0")

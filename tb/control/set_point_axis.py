@@ -103,7 +103,7 @@ class SetPointAxis:
         if state:
             self.queued, self.resting = queued, int(not moving and queued == 0)
         self.ahead += ("pushed" in strobes) * ticks - int(tick and self.ahead > 0)
-        self.ahead %= 1 << 12
+        self.ahead %= 1 << 13
         self.accepted = (self.accepted + ("accepted" in strobes)) % (1 << 16)
         self.late = (self.late + (cause == LATE)) % 256
         self.refused = (self.refused + (cause not in (None, LATE)) + dropped) % 256

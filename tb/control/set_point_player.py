@@ -65,9 +65,9 @@ class SetPointPlayer:
         if a.stop_due:
             return ["stopped"], 0, None
         if a.active and not allowed:
-            if a.anchored and self.rests(n):
-                return [], 0, ("release", [0, 0, 0, 1 | LAST], 1)
-            return ["quits"], STOPPED, None
+            if not a.anchored or not self.rests(n):
+                return ["quits"], STOPPED, None
+            return [], 0, None if a.full else ("release", [0, 0, 0, 1 | LAST], 1)
         if a.begins(allowed):
             if not enabled:
                 return ["quits"], FAULT, None

@@ -76,6 +76,16 @@ async def latency_is_1_and_ahead_counts_the_ticks_that_are_queued(dut):
 
 
 @cocotb.test()
+async def ahead_holds_a_full_queue_of_the_longest_pieces(dut):
+    """16 that are queued, and one that is being played."""
+    axis = await Axis(dut).reset()
+    await axis.to_begin()
+    for _ in range(17):
+        found = await axis.clk("accepted", "pushed", ticks=255)
+    assert found["ahead"] == HOLD + 17 * 255 and not found["ending"]
+
+
+@cocotb.test()
 async def a_stream_ends_at_once_and_asks_for_a_stop(dut):
     axis = await Axis(dut).reset()
     for why, ended in (

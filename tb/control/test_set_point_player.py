@@ -347,6 +347,25 @@ async def what_breaks_a_rule_is_refused_counted_and_changes_nothing(dut):
 
 
 @cocotb.test()
+async def a_full_queue_is_played_before_the_stream_is_released(dut):
+    needs(int(dut.AXES.value) == 1, "one axis is enough")
+    player = await Player(dut).reset()
+    a, engine = player.model.axes[0], player.engines[0]
+    await player.begin(axes=1)
+    end = player.model.tick_count + a.ahead
+    while not a.full:  # it goes a little and rests there
+        end += 30
+        await player.set_point(end, {0: (50, 0)})
+        await player.run(900)
+    await player.setting("stream_axes", 0)
+    await player.until(lambda: a.ended == set_point_axis.RELEASED)
+    assert player.model.tick_count < end and engine.axis.moving
+    await player.until(lambda: not engine.axis.moving, ticks=600)
+    assert engine.axis.target == 50 and player.model.tick_count >= end
+    assert not engine.axis.queue and a.mode == set_point_axis.OFF
+
+
+@cocotb.test()
 async def every_end_of_a_stream_leaves_an_empty_queue(dut):
     needs(int(dut.AXES.value) == 1, "one axis is enough")
     player = await Player(dut).reset()

@@ -329,6 +329,13 @@ def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(
             ("velocity = 50", "velocity = 50\nbacklash_um = 5"),
             "backlash_um needs the feature backlash of the axis",
         ),
+        (
+            (
+                'drives = ["stepper"]\n\n[axis.linuxcnc]',
+                'drives = ["dac"]\nfeatures = ["backlash"]\n\n[axis.linuxcnc]\nbacklash_um = 5',
+            ),
+            'backlash_um needs a stepper, or sensor = "motor"',
+        ),
         (("velocity = 50", "velocity = 50\nbacklash_um = -1"), "backlash_um -1 with take_up 1:"),
         (("velocity = 50", "velocity = 50\ntake_up = 0"), "backlash_um 0 with take_up 0:"),
         (("velocity = 50", 'velocity = 50\nsensor = "wheel"'), "sensor 'wheel' is none of table,"),

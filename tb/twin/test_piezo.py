@@ -108,6 +108,21 @@ def test_the_sensor_sees_table_and_piezo_together_and_the_table_feels_the_platfo
     assert 1e-11 < abs(table - before).max() < 20e-9
 
 
+def test_the_platform_lags_a_table_that_accelerates_and_swings_when_it_stops():
+    """By velocity / (2 pi 500 Hz), if the table stops at once."""
+    stage = Stage(piezo_fitted=1, piezo_creep=0)
+    stage.bridge(0.05, 0.3)
+    stage.trace(1_000_000)
+    stage.run(1e-5)
+    velocity = stage.take_trace()["velocity_m_s"][-1]
+    assert velocity > 1e-3
+    stage.hold(rotor=True, table=True)
+    stage.trace(100_000)
+    stage.run(1e-3)
+    swing = stage.take_trace()["piezo_m"].max()
+    assert swing == pytest.approx(velocity / (2 * math.pi * 500), rel=0.1)
+
+
 def test_a_stage_without_a_piezo_does_not_move_by_its_converter():
     stage = Stage()
     assert go(stage, 65535) == 0.0

@@ -47,9 +47,11 @@ void Stage::move(uint64_t now) {
     spend(now, drive());
     const double shaken = floor_.step(p_.floor_velocity);
     plant.drivetrain.external_force = pushed_ + piezo.reaction - p_.table_mass * shaken;
+    const double before = plant.drivetrain.velocity;
     plant.step({spent_[0], spent_[1], spent_[2], spent_[3]}, time_step());
     spent_ = {};
-    if (p_.piezo_fitted != 0) piezo.step(dac.share(), time_step(), shaken);
+    const double gained = plant.drivetrain.velocity - before;
+    if (p_.piezo_fitted != 0) piezo.step(dac.share(), time_step(), shaken + gained / time_step());
 }
 
 uint64_t Stage::sense(uint64_t now) {

@@ -145,8 +145,9 @@ class Axis(AxisParameters, AxisCapture):
         the velocity beyond that of the target (mm/s, or a text) with which it does so.
 
         hysteresis: how far the target must come back until that is a reversal (nm, or a text).
-        motor_side: the sensor is on the motor's side of the backlash. It is valid until the node
-        has no power. Raises OutOfRange, or Refused `not_built` without HAS_BACKLASH.
+        motor_side: the sensor is on the motor's side of the backlash, which it must be in an axis
+        without a stepper. It is valid until the node has no power. Raises OutOfRange, or Refused
+        `not_built` without HAS_BACKLASH.
         """
         counts = self.to_counts(backlash)
         ticks = self.node.identity.tick_hz
@@ -162,14 +163,19 @@ class Axis(AxisParameters, AxisCapture):
                 f"must be 0 to {most}, the velocity above 0 and at most that in each servo tick, "
                 f"the hysteresis 0 to {half}"
             )
-        self.node.write_named("feedback.backlash", self.number, value=counts)
-        self.node.write_named(
+        if counts and not motor_side and not self.built().has("stepper"):
+            raise OutOfRange(
+                f"axis {self.number} of node {self.node.address} has no stepper: with its sensor on "
+                "the table a servo takes the backlash up itself; motor_side is for one on the motor"
+            )
+        self.node.write_named(  # before the backlash, which would else be taken up at once
             "feedback.backlash_rate",
             self.number,
             value=rate,
             hysteresis=back,
             motor_side=int(motor_side),
         )
+        self.node.write_named("feedback.backlash", self.number, value=counts)
 
     def drive(self) -> Drive:
         """Which output the drive command goes to, and its present value."""
