@@ -275,3 +275,24 @@ def test_home_stores_the_requested_method():
         assert node.parameter("home_method") == counts
     with pytest.raises(OutOfRange, match="home_method allows -2 to 37, not 99"):
         axis.home(method=99)
+
+
+def test_the_rate_of_the_backlash_is_known_before_the_backlash(monkeypatch):
+    """Without a rate the motor would take it up at once."""
+    _, _, axis = stage()
+    written = []
+    monkeypatch.setattr(axis.node, "write_named", lambda name, *_, **fields: written.append(name))
+    axis.set_backlash("5um", "1mm/s", "0.2um")
+    assert written == ["feedback.backlash_rate", "feedback.backlash"]
+
+
+def test_a_servo_with_its_sensor_on_the_table_needs_no_backlash(monkeypatch):
+    _, _, axis = stage(absent=("stepper",))
+    written = []
+    monkeypatch.setattr(axis.node, "write_named", lambda name, *_, **fields: written.append(fields))
+    with pytest.raises(OutOfRange, match="axis 0 of node 1 has no stepper: with its sensor on"):
+        axis.set_backlash("5um", "1mm/s", "0.2um")
+    assert not written
+    axis.set_backlash("5um", "1mm/s", "0.2um", motor_side=True)
+    axis.set_backlash(0, "1mm/s", 0)
+    assert [fields.get("motor_side") for fields in written] == [1, None, 0, None]

@@ -331,8 +331,8 @@ def test_set_up_and_driver_have_the_same_session_and_each_configuration_its_own(
         ),
         (
             (
-                'drives = ["stepper"]\n\n[axis.linuxcnc]',
-                'drives = ["dac"]\nfeatures = ["backlash"]\n\n[axis.linuxcnc]\nbacklash_um = 5',
+                'drives = ["stepper"]\n[axis.linuxcnc]',
+                'drives = ["dac"]\nfeatures = ["backlash"]\n[axis.linuxcnc]\nbacklash_um = 5',
             ),
             'backlash_um needs a stepper, or sensor = "motor"',
         ),
