@@ -199,6 +199,14 @@ def random_target(
             return target
 
 
+def spread(seed: str, places: int, high_nm: float) -> list[float]:
+    """Random positions, one in each of so many equal parts of the way, in a random order."""
+    source = random.Random(seed)
+    found = [high_nm * (part + source.random()) / places for part in range(places)]
+    source.shuffle(found)
+    return found
+
+
 def random_moves(
     stage: Stage,
     count: int,
@@ -207,13 +215,21 @@ def random_moves(
     done: Callable[[report.Move], object] | None = None,
     high_nm: float = 20e6,
     lengths_nm: tuple[float, float] = (100.0, 2e6),
+    places: int = 1,
 ) -> list[report.Move]:
     """Makes `count` moves of the axes in turn, from 0 to `high_nm`, the shortest and the longest
-    of `lengths_nm`; the seed determines the targets.
+    of `lengths_nm`; the seed determines the targets. They begin at 0. Since they reach a part of
+    the way only, they may be divided among several `places`: somewhere in each of so many equal
+    parts of the way. The moves that lead there are not among those that are returned.
     """
     source, here = random.Random(seed), {name: 0.0 for name in stage.axes}
+    begins = {name: spread(f"{seed} {name}", places, high_nm) for name in stage.axes}
     moves: list[report.Move] = []
     for number in range(count):
+        if places > 1 and number * places % count < places:  # the first move at a place
+            for name, at in begins.items():
+                here[name] = at.pop()
+                stage.move(name, here[name], progress)
         name = list(stage.axes)[number % len(stage.axes)]
         here[name] = random_target(here[name], source, *lengths_nm, high_nm=high_nm)
         moves.append(stage.move(name, here[name], progress))

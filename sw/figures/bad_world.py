@@ -27,6 +27,7 @@ from twin.parameters.tables import world
 SEED = 1
 LENGTH_NM = 500_000  # of a segment
 SEGMENTS = 40  # 20 mm, as far as the random moves go
+PLACES = 10  # from which they begin
 READINGS = 4  # at a border
 DRIFT_S = 60.0  # everything that drifts has drifted by then
 
@@ -76,7 +77,7 @@ def measure_segments(
 
 
 def moves_within(stage: Stage, count: int, segments: int, seed: int) -> list[Move]:
-    """So many random moves within the segments, with their progress shown."""
+    """So many random moves all over the segments, with their progress shown."""
     with bar("moves") as progress:
         task = progress.add_task("", total=count)
         return random_moves(
@@ -85,6 +86,7 @@ def moves_within(stage: Stage, count: int, segments: int, seed: int) -> list[Mov
             seed,
             done=lambda move: progress.advance(task),
             high_nm=float(segments * LENGTH_NM),
+            places=min(PLACES, count),
         )
 
 
@@ -191,8 +193,8 @@ FIGURES = {
         "um",
         "S0 with the bad value of every effect of stage.toml (scale, guides, temperature, drift, "
         "floor VC-C, motor, converters), the scale measured every 0.5 mm: largest "
-        "|target - true position| of 100 random moves (0.1 um to 2 mm, which "
-        "reach 6 mm of 20), motor only",
+        "|target - true position| of 100 random moves (0.1 um to 2 mm, from ten "
+        "places all over 20 mm), motor only",
         "<= 0.3",
         Quick(
             {"count": 2, "segments": 3, "axes": 1},
@@ -205,9 +207,9 @@ FIGURES = {
         "nm",
         "S0 with the bad value of every effect of stage.toml, its scale measured every 0.5 mm and "
         "its calibration following: rms of target - true position of 100 random moves (0.1 um to "
-        "2 mm, which reach 10 mm of 20), motor and piezo, from a zero that was measured in the "
-        "same way; the signals drift within 10 minutes, the temperature with a time constant of "
-        "half an hour",
+        "2 mm, from ten places all over 20 mm), motor and piezo with a notch at its mode, from a "
+        "zero that was measured in the same way; the signals drift within 10 minutes, the "
+        "temperature with a time constant of half an hour",
         "<= 10",
         Quick(
             {"count": 2, "segments": 1, "calibrated": False},

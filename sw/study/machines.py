@@ -94,6 +94,7 @@ def run_s0(values: Mapping[str, float], measure: Measure, seed: int, targets: in
             targets,
             high_nm=measure.travel_nm,
             lengths_nm=(measure.shortest_move_nm, measure.longest_move_nm),
+            places=measure.moves,
         )
         return Measured([move.error_nm for move in moves], stage.bus.transport.now())
 

@@ -10,9 +10,18 @@ import numpy as np
 import pytest
 
 from figures import flips
+from figures.common import seeds
 from tb.bench import rtl_only
 
 MACHINE = flips.Machine(lambda seed: None, 1000.0, 100.0, 10.0)
+
+
+def test_the_parts_of_a_campaign_share_an_order_of_the_bits_which_changes_with_its_seed():
+    orders = [
+        {flips.common_seed(part, one) for part, one in enumerate(seeds(seed, 8))}
+        for seed in (1, 2, 9)
+    ]
+    assert [len(order) for order in orders] == [1, 1, 1] and len(set().union(*orders)) == 3
 
 
 def run_of(there=0.0, end=0.0, **changes):

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The judges of s0_bus_wrong and eeprom_torn detect nodes with a planted fault."""
+"""The judges of s0_bus_wrong and eeprom_torn detect nodes with a planted fault, and the random moves
+of S0 in a bad world lie all over its travel.
+"""
 
 import zlib
 
 import pytest
 
+from experiments.s0_stage import random_moves
 from figures import job as figures_job
 from figures import s0 as figures_s0
 from figures.s0 import ADDRESS, CELLS, READY, s0_bus_wrong
@@ -110,3 +113,29 @@ def test_the_eeprom_judge_survives_an_empty_program_and_counts_it(monkeypatch):
     assert figures_job.torn(cuts=12) == 0
     monkeypatch.setattr(station.Station, "power_cut", wiped)
     assert figures_job.torn(cuts=12) > 0
+
+
+class MovesOnly:
+    """Replaces the stage of S0: every move ends where it should."""
+
+    def __init__(self):
+        self.axes, self.targets = {"X": None, "Y": None}, []
+
+    def move(self, name, target_nm, progress=None):
+        self.targets.append((name, target_nm))
+        return name, target_nm
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_random_moves_may_begin_all_over_the_travel(seed):
+    stage = MovesOnly()
+    found = random_moves(stage, 100, seed, high_nm=20e6, places=10)
+    ways = [one for one in stage.targets if one not in found]
+    assert len(found) == 100 and len(ways) == 20
+    for name in stage.axes:
+        begins = sorted(at for one, at in ways if one == name)
+        assert [int(at // 2e6) for at in begins] == list(range(10))
+        assert max(at for one, at in found if one == name) > 15e6
+    assert all(0 <= at <= 20e6 for _, at in stage.targets)
+    alone = MovesOnly()
+    assert random_moves(alone, 100, seed) == alone.targets, "from one place there is no other move"

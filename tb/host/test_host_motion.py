@@ -290,7 +290,7 @@ def test_a_servo_with_its_sensor_on_the_table_needs_no_backlash(monkeypatch):
     _, _, axis = stage(absent=("stepper",))
     written = []
     monkeypatch.setattr(axis.node, "write_named", lambda name, *_, **fields: written.append(fields))
-    with pytest.raises(OutOfRange, match="axis 0 of node 1 has no stepper: with its sensor on"):
+    with pytest.raises(OutOfRange, match="axis 0 of node 1 has no stepper: with its sensor"):
         axis.set_backlash("5um", "1mm/s", "0.2um")
     assert not written
     axis.set_backlash("5um", "1mm/s", "0.2um", motor_side=True)

@@ -165,8 +165,9 @@ class Axis(AxisParameters, AxisCapture):
             )
         if counts and not motor_side and not self.built().has("stepper"):
             raise OutOfRange(
-                f"axis {self.number} of node {self.node.address} has no stepper: with its sensor on "
-                "the table a servo takes the backlash up itself; motor_side is for one on the motor"
+                f"axis {self.number} of node {self.node.address} has no stepper: with its sensor "
+                "on the table a servo takes the backlash up itself; motor_side is for one on the "
+                "motor"
             )
         self.node.write_named(  # before the backlash, which would else be taken up at once
             "feedback.backlash_rate",
