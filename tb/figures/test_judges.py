@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The judges of s0_bus_wrong and eeprom_torn detect nodes with a planted fault, and the random moves
-of S0 in a bad world lie all over its travel.
+"""The judges of s0_bus_wrong and eeprom_torn detect nodes with a planted fault; the random moves of
+S0 in a bad world lie all over its travel.
 """
 
 import zlib
