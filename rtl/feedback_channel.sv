@@ -295,6 +295,7 @@ module feedback_channel #(
         .harmonic_enable,
         .learn,
         // settings of the signal monitor
+        .by_counts,
         .amplitude_low,
         .amplitude_high,
         .clip_level,

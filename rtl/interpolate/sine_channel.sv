@@ -36,6 +36,7 @@ module sine_channel #(
     input wire harmonic_enable,  // level: correct the harmonics
     input wire learn,  // level: learn the count again
     // settings of the signal monitor
+    input wire by_counts,  // level: no samples are taken, so that none can be bad
     input wire [15:0] amplitude_low,  // ADC counts, smallest amplitude
     input wire [15:0] amplitude_high,  // ADC counts, largest amplitude
     input wire [15:0] clip_level,  // ADC counts, largest good magnitude of a sample
@@ -107,7 +108,7 @@ module sine_channel #(
         assign {sample_valid, sample_sin, sample_cos} = '0;
 
         wire unused_pins = &{1'b0, clk, rst, adc_sin, adc_cos, convert, levels};
-        wire unused_axis = &{1'b0, amplitude_low, amplitude_high, quadrature_count};
+        wire unused_axis = &{1'b0, amplitude_low, amplitude_high, quadrature_count, by_counts};
         wire unused_limits = &{
             1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
             offset_limit, balance_limit, quadrature_limit, clear_signal_faults
@@ -227,7 +228,7 @@ module sine_channel #(
                 .W(W)
             ) u_monitor (
                 .clk,
-                .rst,
+                .rst       (rst || by_counts),
                 .clear     (clear_signal_faults),
                 // limits
                 .low       (amplitude_low),
@@ -264,7 +265,7 @@ module sine_channel #(
             wire unused_axis = &{1'b0, amplitude_low, amplitude_high, sampled};
             wire unused_limits = &{
                 1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
-                offset_limit, balance_limit, quadrature_limit, clear_signal_faults, levels
+                offset_limit, balance_limit, quadrature_limit, clear_signal_faults, levels, by_counts
             };
         end
         if (HAS_RECORDER != 0) begin : g_recorder

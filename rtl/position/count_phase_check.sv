@@ -8,15 +8,16 @@
 //          when both move alike, wherever the origin is: a shift of the origin changes nothing. It
 //          is exact modulo 2^16 periods; so many lost ones in a row would not be seen.
 // behaviour  The position at which both agree is learned from the first step after reset or after
-//          `learn`, and from every step while limit is 0. With AXES above 1 it serves several axes;
-//          step, count and limit must be those of the axis of the step.
+//          `learn`, and from every step while limit is 0. `learn` also ends a disagreement, in the
+//          next cycle. With AXES above 1 it serves several axes; step, count and limit must be those
+//          of the axis of the step.
 // limits   `limit` must cover the quarter period between two counts, the offset of the two
 //          comparators, and twice the distance travelled while the deglitchers delay an edge: the
 //          count lags that distance in each direction.
 // source   S0: the fringe count and the arctangent come from the same two photodetectors
 // model    tb/position/count_phase_check.py, equal in every bit of every cycle
-// proved   there is no disagreement while limit is 0, and none while the steps move the position by
-//          as much as the count
+// proved   there is no disagreement while limit is 0, none while the steps move the position by as
+//          much as the count, and none of steps until `learn`
 // proof    depth 8
 `default_nettype none
 
@@ -71,16 +72,17 @@ module count_phase_check #(
     always_ff @(posedge clk) begin
         measured   <= valid;
         axis_q     <= axis;
-        learned    <= learns;
+        learned    <= learns || learn[axis];
         moved_q    <= moved;
         count_q    <= count[D-15:0];
         limit_q    <= limit;
         compared   <= measured;
         axis_qq    <= axis_q;
-        learned_q  <= learned;
+        learned_q  <= learned || learn[axis_q];
         limit_qq   <= limit_q;
         difference <= {moved_q[D-1:14] - count_q, moved_q[13:0]};
         if (compared) disagreement[axis_qq] <= !learned_q && (far || beyond);
+        for (int n = 0; n < AXES; n++) if (learn[n]) disagreement[n] <= 1'b0;
         known <= (known | (AXES'(valid) << axis)) & ~learn;
         if (rst) begin
             known        <= '0;
@@ -107,6 +109,8 @@ module count_phase_check #(
         if (past) begin
             if (compared && limit_qq == 0) assert (learned_q);
             if ($past(compared) && $past(limit_qq) == 0) assert (!disagreement);
+            if ($past(learn)) assert (!disagreement && (!compared || learned_q));
+            if ($past(learn)) assert (!measured || learned);
             if (alike) begin
                 if (known) assert (travelled == {last_q, 14'b0});
                 if (measured && !learned) assert (moved_q == {count_q, 14'b0});

@@ -27,10 +27,12 @@ class CountPhaseCheck:
     def step(self, learn, valid, axis, step, count, limit):
         """`learn` has one bit for each axis."""
         self.flow.append((axis, self.judge(axis, step, count, limit)) if valid else None)
-        for n in range(len(self.travelled)):
-            if learn >> n & 1:
-                self.travelled[n] = None
         ready = self.flow.pop(0)
         if ready:
             self.disagreement = self.disagreement & ~(1 << ready[0]) | ready[1] << ready[0]
+        for n in range(len(self.travelled)):
+            if learn >> n & 1:
+                self.travelled[n] = None
+                self.disagreement &= ~(1 << n)
+                self.flow = [(n, 0) if one and one[0] == n else one for one in self.flow]
         return self.disagreement

@@ -101,12 +101,24 @@ async def learning_again_or_limit_0_ends_a_disagreement(dut):
     await begin(dut)
     await settle(dut, 0, 0)
     assert await settle(dut, 65535, 0)
-    assert await clock(dut, 0, 0, valid=0, learn=1)  # until the next step
+    assert not await clock(dut, 0, 0, valid=0, learn=1)
     assert not await settle(dut, 0, 0)
     assert await settle(dut, -40000, 0)
     assert not await settle(dut, 0, 0, limit=0)
     assert not await settle(dut, 0, 0)
     assert await settle(dut, 40000, 0)
+
+
+@cocotb.test()
+async def learning_forgets_what_is_not_judged_yet(dut):
+    await begin(dut)
+    for after in range(LATENCY + 1):  # cycles from a step that disagrees
+        await again(dut)
+        await settle(dut, 0, 0)
+        await clock(dut, 65535, 0, learn=int(after == 0))
+        for n in range(1, 2 * LATENCY):
+            level = await clock(dut, 0, 0, valid=0, learn=int(n == after))
+            assert level == int(LATENCY - 1 <= n < after)
 
 
 @cocotb.test()

@@ -163,7 +163,6 @@ def test_a_position_that_leaves_its_count_is_a_disagreement(node, axis):
     assert not node.bits("axis.encoder_events", other(axis))
     assert node.read("feedback.signal_faults", axis=axis) >> 14 & 1
     node.write("axis.shift_origin", 0, axis=axis)
-    node.run(8 * SAMPLE)
     node.write("axis.encoder_events", 63, axis=axis)
     node.run(4 * SAMPLE)
     assert not node.bits("axis.encoder_events", axis), "it has learned the count again"
@@ -402,6 +401,25 @@ def test_the_limits_of_the_shape_of_the_signals(node, axis):
     scale.gain[axis] = 0.6
     scale.turn(axis, 1)
     assert "off_circle" in first(node, axis)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_position_made_of_counts_ends_the_faults_of_sine_and_cosine(node, axis):
+    scale = Scale(node)
+    settle(node, axis)
+    limits(node, axis, low=50)
+    node.write("axis.disagreement_limit", PERIOD // 2, axis=axis)
+    scale.gain[axis] = 0.1
+    scale.comparators = False
+    scale.turn(axis, 2)
+    found = node.read("feedback.signal_faults", axis=axis)
+    assert found & 1 and found >> 14 & 1
+    node.write("feedback.position_source", counts=1, axis=axis)
+    node.run(4)
+    assert not node.read("feedback.signal_faults", axis=axis)
+    node.write("axis.encoder_events", 63, axis=axis)
+    node.run(4)
+    assert not node.bits("axis.encoder_events", axis)
 
 
 def test_sine_and_counts_change_places_by_the_source_of_the_position(node):
