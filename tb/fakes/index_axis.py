@@ -5,13 +5,15 @@ at a constant speed, in which every edge of A, B and Z is drawn again.
 
 import random
 from fractions import Fraction
+from types import SimpleNamespace
 
 from moire.client.built import Built
+from moire.client.capture import LONGEST_AGE
 from moire.client.records import Capture
 from moire.client.values import counts_of, one_count, parameter, value_of
 from moire.errors import MotionFailed
 
-CLK_HZ = 10**8
+CLK_HZ = 60_000_000
 COUNT_NM = 1000
 PERIOD_NM = Fraction(4 * COUNT_NM)
 PARAMETERS = {
@@ -52,6 +54,7 @@ class IndexAxis:
         self.queue = queue  # of captures, is built
         self.random = random.Random(seed)
         self.period_nm, self.number = PERIOD_NM, 0
+        self.node = SimpleNamespace(identity=SimpleNamespace(clk_hz=CLK_HZ))
         self.counts = {}
         for name, text in {**PARAMETERS, **parameters}.items():
             self.write_parameter(name, counts_of(parameter(name), text, self.one(name)))
@@ -133,7 +136,7 @@ class IndexAxis:
                         ("index",),
                         (met[0] - self.origin) * COUNT_NM,
                         0,
-                        met[1] / speed * self.slowness,
+                        min(met[1] / speed * self.slowness, LONGEST_AGE / CLK_HZ),
                     )
                 )
 

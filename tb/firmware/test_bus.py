@@ -342,6 +342,27 @@ def test_registers_are_read_by_address_but_never_a_queue():
         )
 
 
+def test_both_words_of_a_wide_register_are_of_the_same_moment():
+    """The firmware reads the time itself between two requests, and the hardware holds the high word
+    of the latest reading.
+    """
+    machine = CompiledNode()
+    address = DEFINES["NODE_BASE"] + DEFINES["NODE_TIME_STAMP_LOW"]
+
+    def read(at):
+        return machine.ask("read_register", address=at)["value"]
+
+    machine.clk = (5 << 32) - 10
+    low = read(address)
+    machine.clk += 1 << 32
+    assert low > 1 << 31 and read(address + 4) == 4
+    assert read(address + 4) >= 5, "a word is kept for one request"
+    read(address)
+    assert read(DEFINES["NODE_MAP_CRC"]) == DEFINES["MAP_CRC"]
+    machine.clk += 1 << 32
+    assert read(address + 4) >= 6, "another request lies between"
+
+
 def test_the_registers_of_the_link_are_written_only_where_it_is_built():
     machine = CompiledNode()
     entry = {"address": DEFINES["LINK_BASE"] + DEFINES["LINK_ENTRY"], "value": 0x0410_0400}

@@ -166,6 +166,10 @@ def test_no_index_at_all_is_the_failure_of_homing():
         ({"position_source": "phases"}, "needs position_source counts, not phases"),
         ({"decoder_mode": "every_second"}, "needs decoder_mode every_edge"),
         ({"segments": "linear"}, "needs segments off"),
+        (
+            {"homing_search_speed": "1.6mm/s"},
+            r"homing_search_speed 1.6mm/s is too slow for a survey: .* to 1.09ms .* needs 1.65mm/s",
+        ),
         ({"queue": False}, "needs the ages of captures: it needs HAS_CAPTURE of rtl/node.sv"),
     ],
 )

@@ -172,17 +172,33 @@ static bool has_read_effect(uint32_t address) {
            address == PERIPHERALS_BASE + PERIPHERALS_PEER_RECEIVE;
 }
 
-// A block has 64 words; those without a register read 0.
+// A block has 64 words; those without a register read 0. Those of the node fill all addresses below
+// the axes.
+_Static_assert(LINK_BASE + 0x100u == AXIS_BASE, "a block of the node is not below the axes");
+
+static __attribute__((noinline)) bool may_read(uint32_t address) {
+    uint32_t block = address & ~0xFFu;
+    if (address % 4 || has_read_effect(address)) return false;
+    if (of_axis(block, FEEDBACK_BASE)) return feedback_may_read(address - block);
+    return block < AXIS_BASE || of_axis(block, AXIS_BASE) || of_axis(block, ACTUATOR_BASE);
+}
+
+// The word behind the one that is asked for is read with it and kept for the next request: it may
+// be the high word of a wide register, and the firmware reads wide registers between two requests.
 static uint8_t read_register(void) {
-    uint32_t address = (uint32_t)get(&current_request[BUS_READ_REGISTER_REQUEST_ADDRESS], 2),
-             block = address & ~0xFFu;
-    bool exists = block == NODE_BASE || block == BUS_BASE || block == PERIPHERALS_BASE ||
-                  block == LINK_BASE || of_axis(block, AXIS_BASE) ||
-                  of_axis(block, FEEDBACK_BASE) || of_axis(block, ACTUATOR_BASE);
-    if (!exists || address % 4 || has_read_effect(address)) return BUS_CAUSE_NO_SUCH_REGISTER;
-    if (of_axis(block, FEEDBACK_BASE) && !feedback_may_read(address - block))
-        return BUS_CAUSE_NO_SUCH_REGISTER;
-    put(BUS_READ_REGISTER_REPLY_VALUE, register_read(address), 4);
+    static uint32_t kept, kept_for;  // its address + 1; 0: none is kept
+    uint32_t address = (uint32_t)get(&current_request[BUS_READ_REGISTER_REQUEST_ADDRESS], 2);
+    if (!may_read(address)) return BUS_CAUSE_NO_SUCH_REGISTER;
+    uint32_t value = kept, next = 0;
+    if (address + 1u != kept_for) {
+        value = register_read(address);
+        if (may_read(address + 4u)) {
+            kept = register_read(address + 4u);
+            next = address + 5u;
+        }
+    }
+    kept_for = next;
+    put(BUS_READ_REGISTER_REPLY_VALUE, value, 4);
     return BUS_CAUSE_OK;
 }
 

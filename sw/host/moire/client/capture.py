@@ -22,6 +22,7 @@ SOURCE_BITS = {bit: (name, name) for bit, name in enumerate(CAPTURE_SOURCES)}
 POSITIONS = range(-(1 << 47), 1 << 47)  # counts that a register of positions holds
 PULSE_CYCLES = range(1, 1 << 24)  # cycles that a register of pulse lengths holds
 POINTS = range(1 << 32)
+LONGEST_AGE = 65535  # cycles: the age of a capture that has this one or a longer one
 
 
 class AxisCapture(AxisAccess):

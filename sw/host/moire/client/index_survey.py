@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from moire import units
 from moire.client.built import remedy
+from moire.client.capture import LONGEST_AGE
 from moire.client.records import IndexSurvey
 from moire.client.values import CHOICES
 from moire.errors import MoireError, MotionFailed, NotSurveyed, OutOfRange
@@ -125,6 +126,14 @@ class Survey:
         self.count_nm = axis.period_nm / STATES
         self.index = {**axis.feedback("index"), **NO_GATE}
         self.speed = axis.get_parameter("homing_search_speed")
+        longest_s = Fraction(LONGEST_AGE, axis.node.identity.clk_hz)
+        least = Fraction(SLOWEST) * self.count_nm / longest_s / 10**6
+        if self.speed.value < least:
+            raise OutOfRange(
+                f"homing_search_speed {self.speed.written(3)} is too slow for a survey: the node "
+                f"measures up to {units.format_time(longest_s, 3)} from one count to the next, "
+                f"which needs {units.format_speed(least, 3)}"
+            )
         self.mark_nm = axis.get_parameter("home_offset").value
         self.travel_nm = tuple(axis.get_parameter(f"travel_{end}").value for end in ("low", "high"))
         acceleration, jerk = (axis.get_parameter(name).value for name in ("acceleration", "jerk"))

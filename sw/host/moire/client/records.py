@@ -202,7 +202,7 @@ class Capture:
     sources: tuple[str, ...]  # names of CAPTURE_SOURCES, several if they came at once
     position_nm: float  # of the last sample before the event
     time_clk: int  # time of the event in cycles, wraps at 2^32
-    age_s: float  # time from that sample to the event
+    age_s: float  # time from that sample to the event; the longest that is counted, or longer
 
 
 @dataclass(frozen=True)
