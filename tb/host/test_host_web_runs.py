@@ -79,6 +79,23 @@ def test_a_stop_ends_a_calibration_with_its_cause(served):
     assert client_axis(served).calibration().frozen
 
 
+def test_a_stop_between_two_strokes_ends_a_calibration(served, monkeypatch):
+    begun = calibrating.Run.progress
+    with served.http() as client, served.http() as other:
+
+        def progress(run, state):
+            begun(run, state)
+            if run.strokes == 1:
+                other.done("POST", f"{AXIS}/stop")
+
+        monkeypatch.setattr(calibrating.Run, "progress", progress)
+        client.done("POST", RUN)
+        found = ended(served, client)
+    assert (found["state"], found["strokes"]) == ("ended", 1)
+    assert "was stopped while it was being begun" in found["words"]
+    assert served.node.state() == "holding" and client_axis(served).calibration().frozen
+
+
 def test_a_calibration_whose_client_leaves_is_ended_properly(served):
     velocity = served.node.parameter("velocity")
     with served.http() as client:

@@ -28,8 +28,11 @@ def calibrate(
     progress: Callable[[CalibrationState], object] | None,
     distance: units.Value,
     timeout: units.Value,
+    check: Callable[[], object] | None = None,
 ) -> CalibrationState:
-    """See Axis.calibrate()."""
+    """See Axis.calibrate(). `check` is called when a stroke has begun; what it raises, after it has
+    stopped the axis, ends the calibration.
+    """
     stroke, patience = units.parse_length(distance), units.parse_time(timeout)
     if stroke <= 0 or patience <= 0:
         raise OutOfRange("distance and timeout of the calibration must be above zero")
@@ -57,6 +60,8 @@ def calibrate(
             begun = True
             axis.calibration("clear")
             axis.calibration("calibrate")
+        if check is not None:
+            check()
         axis.wait(follow)
 
     try:

@@ -91,6 +91,13 @@ class Moment(NamedTuple):
     status: Status
 
 
+def was_stopped() -> Refused:
+    """A stop has come while a motion was being begun."""
+    return Refused(
+        "stopped", CAUSE_CODES["stopped"], "the motion was stopped while it was being begun"
+    )
+
+
 class Bridge:
     """All clients of the doors in front of one gateway."""
 

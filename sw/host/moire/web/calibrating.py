@@ -8,17 +8,18 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from http import HTTPStatus
 from typing import Any
 
 from moire.bus.arbiter import Place
 from moire.client.axis import HARMONICS, Axis
-from moire.client.calibration import end_calibration
+from moire.client.calibration import calibrate, end_calibration
 from moire.client.names import CAUSE_CODES, refusal
 from moire.client.records import CalibrationState, Correction
 from moire.client.values import ParameterValue
 from moire.errors import MoireError
-from moire.web.bridge import Bridge, Client
+from moire.web.bridge import Bridge, Client, was_stopped
 from moire.web.refusals import BadRequest
 
 HARMONIC_LSB = 2.0**-24  # of a period
@@ -89,12 +90,21 @@ async def begin(bridge: Bridge, client: Client, place: Place, given: Mapping[str
 
 
 async def carry_out(bridge: Bridge, run: Run, place: Place, distance: str, timeout: Any) -> None:
-    """Carries a calibration out. If its client leaves meanwhile, the server ends it properly."""
+    """Carries a calibration out. A stop ends it, also one between two strokes: it is ahead of the
+    next stroke in the queue. If its client leaves meanwhile, the server ends it properly.
+    """
+    stops = bridge.gateway.stops[place]
+
+    def check(axis: Axis) -> None:
+        if bridge.gateway.stops[place] != stops:
+            axis.stop_and_wait()
+            raise was_stopped()
+
     try:
         run.latest = await bridge.command(
             run.client,
             place,
-            lambda axis: axis.calibrate(run.progress, distance, timeout),
+            lambda axis: calibrate(axis, run.progress, distance, timeout, partial(check, axis)),
             "calibration",
         )
         run.state, run.words = "done", "the correction is complete and frozen"

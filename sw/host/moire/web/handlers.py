@@ -17,7 +17,7 @@ from moire.client.access import COUNTS
 from moire.client.axis import REACT_S, Axis
 from moire.client.groups import group_of
 from moire.client.job import ACTIONS, Job
-from moire.client.names import CAUSE_CODES, descriptions
+from moire.client.names import descriptions
 from moire.client.nonvolatile import SavedSettings
 from moire.client.parameters import TRAVEL
 from moire.client.records import Identity
@@ -26,7 +26,7 @@ from moire.client.values import ParameterValue
 from moire.errors import MoireError, NoAnswer, Refused
 from moire.made.bus_tables import FAULTS
 from moire.web import calibrating, lissajous, recording
-from moire.web.bridge import Bridge, Moment
+from moire.web.bridge import Bridge, Moment, was_stopped
 from moire.web.operation import Call, Values
 from moire.web.refusals import BadRequest
 
@@ -222,13 +222,6 @@ async def begun(
         await stop(call)
         raise was_stopped()
     return result
-
-
-def was_stopped() -> Refused:
-    """A stop has come while a motion was being begun."""
-    return Refused(
-        "stopped", CAUSE_CODES["stopped"], "the motion was stopped while it was being begun"
-    )
 
 
 def enable_for_move(axis: Axis) -> None:
