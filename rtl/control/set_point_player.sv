@@ -124,6 +124,7 @@ module set_point_player #(
     wire                is_ending = |(ending & here);
     wire                is_allowed = |(allowed & here);
     wire                is_enabled = |(powered & here);
+    wire                is_full = |(full & here);
     wire                begins_here = |(begins & here);
     wire                stops_here = |(stop_due & here);
     wire signed [ 31:0] distance = commit_tick - tick_count - 32'(ahead_here);
@@ -184,7 +185,7 @@ module set_point_player #(
         else if (!(|(complete & here))) check_cause = INCOMPLETE;
         else if (distance < 32'sd1) check_cause = LATE;
         else if (distance > 32'sd255) check_cause = TOO_FAR_AHEAD;
-        else if (|(full & here)) check_cause = QUEUE_FULL;
+        else if (is_full) check_cause = QUEUE_FULL;
         else check_refuses = 1'b0;
     end
     wire gives_up = looks && !stops_here && is_active && !is_allowed && !(is_anchored && rests);
@@ -192,7 +193,7 @@ module set_point_player #(
         && late_next > {1'b0, late_limit};
     wire no_drive = looks && !stops_here && begins_here && !is_enabled;
     wire begins_now = looks && !stops_here && begins_here && is_enabled;
-    wire releases = looks && !stops_here && is_anchored && !is_allowed && rests && !(|(full & here));
+    wire releases = looks && !stops_here && is_anchored && !is_allowed && rests && !is_full;
     wire continues = looks && !stops_here && is_anchored && is_allowed && is_ending && !is_late;
     wire fetch_ends = phase == FETCH && fetched == 3'd6;
     wire withdrawn = phase == OFFER && !is_active;

@@ -265,7 +265,8 @@ module sine_channel #(
             wire unused_axis = &{1'b0, amplitude_low, amplitude_high, sampled};
             wire unused_limits = &{
                 1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
-                offset_limit, balance_limit, quadrature_limit, clear_signal_faults, levels, by_counts
+                offset_limit, balance_limit, quadrature_limit, clear_signal_faults, levels,
+                by_counts
             };
         end
         if (HAS_RECORDER != 0) begin : g_recorder

@@ -9,8 +9,8 @@
 //          is exact modulo 2^16 periods; so many lost ones in a row would not be seen.
 // behaviour  The position at which both agree is learned from the first step after reset or after
 //          `learn`, and from every step while limit is 0. `learn` also ends a disagreement, in the
-//          next cycle. With AXES above 1 it serves several axes; step, count and limit must be those
-//          of the axis of the step.
+//          next cycle. With AXES above 1 it serves several axes; step, count and limit must be
+//          those of the axis of the step.
 // limits   `limit` must cover the quarter period between two counts, the offset of the two
 //          comparators, and twice the distance travelled while the deglitchers delay an edge: the
 //          count lags that distance in each direction.
