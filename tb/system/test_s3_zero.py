@@ -89,13 +89,16 @@ def test_methods_35_and_37_set_the_zero_here(motor, method):
 
 
 def test_a_mark_on_an_edge_of_the_scale_is_surveyed_and_its_gate_finds_one_count():
-    """In a bad world, both edges of the mark lie on those of count 1."""
+    """In a bad world, both edges of the mark lie on those of count 1. If a pass sees the mark begin
+    in the count before, the survey warns.
+    """
     bad = parameters.world("bad", "linear_motor")
     motor = s3_zero.Motor(SEED, scale_index_position=8 / 9e6, scale_index_width=10 / 9e6, **bad)
     motor.axis.enable()
     found = motor.axis.survey_index(passes=2)
-    assert found.gate == "a_high" and not found.warnings and motor.axis.status().homed
-    assert found.margin_nm >= found.least_margin_nm
+    assert found.gate == "a_high" and motor.axis.status().homed
+    narrow = found.margin_nm < found.least_margin_nm
+    assert found.warnings == (("index_on_edge",) if narrow else ())
     assert motor.zero_counts() == 1
     motor.carry(0.2e-3)
     assert motor.search().zero_counts == 1
