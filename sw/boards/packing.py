@@ -41,6 +41,11 @@ def with_firmware(design: Design, folder: Path, text: str) -> str:
         raise SynthesisError(f"the firmware of {design.name} cannot be replaced: {why}") from None
 
 
+def settings_of(design: Design) -> Mapping[str, int]:
+    """What the analog part of the PLL is set to, if there is one."""
+    return design.pll.analog if design.pll else {}
+
+
 def with_settings(text: str, settings: Mapping[str, int]) -> str:
     """The file of a placed ECP5 with these settings of its PLL in place of zeros."""
     for name, value in settings.items():
@@ -54,7 +59,7 @@ def with_settings(text: str, settings: Mapping[str, int]) -> str:
 
 def fill(design: Design, folder: Path) -> str:
     """Writes the file that is packed, with what nextpnr did not put into it; returns its name."""
-    analog = design.pll.analog if design.pll else {}
+    analog = settings_of(design)
     if not design.in_block_ram and not analog:
         return PLACED
     text = with_firmware(design, folder, (folder / PLACED).read_text())
@@ -85,5 +90,5 @@ def packing_hash(design: Design, folder: Path) -> str:
     """
     program = program_of(design, folder).read_bytes() if design.machine.image else b""
     options = design.placer.pack(design.board.part, Path(PLACED), Path())
-    settings = design.pll.analog if design.pll else {}
-    return hashlib.sha256(repr((options, settings)).encode() + program).hexdigest()
+    known = repr((options, settings_of(design)))
+    return hashlib.sha256(known.encode() + program).hexdigest()

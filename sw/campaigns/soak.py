@@ -26,7 +26,7 @@ from rich.progress import (
 
 from campaigns import runner, version
 from campaigns.campaign import Campaign, Result, Task, added
-from campaigns.pages import is_bad, is_good, page, sentence, whole
+from campaigns.pages import is_bad, page, sentence, whole
 from campaigns.runner import Failure, Job
 from campaigns.store import Store
 from figures.common import collected, console
@@ -116,11 +116,9 @@ def conclude(jobs: Mapping[str, Job], store: Store) -> int:
     failed = False
     for job in jobs.values():
         path = store.write_page(job.name, job.version, job.seed, page(job))
-        verdict = "good" if is_good(job) else "BAD"
-        if is_bad(job):
-            failed = True
-        elif job.waiting:
-            verdict = f"{len(job.waiting)} of {job.parts} parts left"
+        bad, left = is_bad(job), len(job.waiting)
+        verdict = "BAD" if bad else f"{left} of {job.parts} parts left" if left else "good"
+        failed = failed or bad
         repeated = f", {job.repeated} parts from before" if job.repeated else ""
         print(f"{job.name}: {verdict}: {sentence(job)}{repeated}; page: {path}", flush=True)
     return int(failed)
