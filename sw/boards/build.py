@@ -15,7 +15,6 @@ import argparse
 import hashlib
 import inspect
 import json
-import re
 import shutil
 import sys
 from collections import Counter
@@ -28,6 +27,7 @@ from boards import board as boards
 from boards import ethernet
 from boards import machine as machines
 from boards.board import Board
+from boards.circuit import TOP, circuit_hash
 from boards.fit import Design, fit
 from boards.generate import files
 from boards.machine import Machine
@@ -161,7 +161,7 @@ def used(design: Design, utilization: Mapping[str, Any]) -> str:
 def cells(netlist: Path) -> str:
     """The largest kinds of cells of a netlist, for a part that is not placed."""
     found: Counter[str] = Counter()
-    for cell in json.loads(netlist.read_text())["modules"]["top"]["cells"].values():
+    for cell in json.loads(netlist.read_text())["modules"][TOP]["cells"].values():
         kind = cell["type"]
         found[next((words for start, words in KINDS.items() if kind.startswith(start)), "")] += 1
     return ", ".join(f"{found[words]} {words}" for words in KINDS.values() if found[words])
@@ -198,16 +198,11 @@ def told(design: Design) -> str:
 
 
 def netlist_state(design: Design, netlist: Path) -> str:
-    """A hash of all that nextpnr sees, except its seed: a change of the RTL that leaves the netlist
-    as it was leaves this hash as it was. The places of lines are left out, and the names that Yosys
-    gives are numbered by their first appearance, since they have numbers of lines in them.
+    """A hash of the circuit and of all else that nextpnr sees, except its seed. A change of the RTL
+    that gives other names or another order to the same circuit leaves it as it was: a placement of
+    that differs as one with another seed would.
     """
-    text = re.sub(r'"(?:\w+_)?src": "[^"]*",?', "", netlist.read_text())
-    numbers: dict[str, int] = {}
-    text = re.sub(
-        r'"(\$[^"]*)"', lambda name: f'"${numbers.setdefault(name[1], len(numbers))}"', text
-    )
-    return hashlib.sha256((told(design) + text).encode()).hexdigest()
+    return hashlib.sha256((told(design) + circuit_hash(netlist)).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

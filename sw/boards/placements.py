@@ -7,9 +7,10 @@ that it fits takes of the part, and how fast it is with each placement seed.
     make boards MINUTES=90               begins no placement after this time
 
 A placement takes minutes to an hour, all of them many hours. Each result is in the record as soon
-as it is there, and is measured again, here or elsewhere, only if nextpnr would see something else:
-so the hours may be divided among sittings and computers. The figures `boards_failed` and
-`board_small_mhz` read the record and measure what it lacks; docs/boards.md has it as a table.
+as it is there, and is measured again, here or elsewhere, only if nextpnr would see another circuit,
+other pins or options: so the hours may be divided among sittings and computers. The figures
+`boards_failed` and `board_small_mhz` read the record and measure what it lacks; docs/boards.md has
+it as a table.
 """
 
 import argparse
@@ -40,7 +41,7 @@ HEAD = """\
 # Written by `make boards` and by the figures of the boards alone; the tables of docs/boards.md are
 # made from it by `make tables`.
 #   sources    hash of what the netlist was made from when it was compared last
-#   netlist    hash of what nextpnr sees of the design; another one is placed again
+#   netlist    hash of the circuit and of what else nextpnr sees; another one is placed again
 #   used       of the part, with the first of the seeds
 #   placement  SHA-256 of the file `placed`, from which the bitstream is packed
 """
@@ -128,7 +129,7 @@ def placed(design: Design, folder: Path, netlist: Path, seed: int) -> tuple[Plac
 
 def measured(design: Design, wanted: Iterable[int], say: Say = lambda _: None) -> Build:
     """What is known of a design after the wanted seeds are placed. It is synthesised only if its
-    sources have changed or a seed is missing, and placed only if nextpnr sees something new.
+    sources have changed or a seed is missing, and placed only if the circuit is another one.
     """
     build.check_tools(design)
     netlist = cache(lambda: synthesised(design))

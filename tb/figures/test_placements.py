@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A design is placed again only if nextpnr would see something new."""
+"""A design is placed again only if nextpnr would see another circuit."""
 
 import sys
 from dataclasses import replace
@@ -12,26 +12,11 @@ from figures.synthesis import NotEndedError, SynthesisError
 from tables.boards import placed_row
 from tb.system.board_files import packer
 
-NETLIST = """{"cells": {"$auto$rtl/axis.sv:%d$%d": {"type": "LUT4", "parameters": {"INIT": "%s"},
-"attributes": {"module_src": "rtl/node.sv:%d.1", "src": "rtl/axis.sv:%d.1"}, "connections": {}}}}"""
-
 
 @pytest.fixture
 def design(monkeypatch, tmp_path):
     monkeypatch.setattr(placements, "RECORD", tmp_path / "placements.toml")
     return fit(board.named("colorlight_i5"), machine.named("mill"))
-
-
-def state(design, path, line, number, init):
-    """The state of a netlist with one cell."""
-    path.write_text(NETLIST % (line, number, init, line, line))
-    return build.netlist_state(design, path)
-
-
-def test_a_netlist_is_another_if_a_cell_is_but_not_if_lines_or_numbers_are(design, tmp_path):
-    before = state(design, tmp_path / "netlist.json", 10, 3, "0110")
-    assert state(design, tmp_path / "netlist.json", 12, 4, "0110") == before
-    assert state(design, tmp_path / "netlist.json", 10, 3, "0111") != before
 
 
 def test_another_pin_or_board_is_another_placement(design):
