@@ -33,6 +33,7 @@ from twin.build import SHORT_RUNS
 
 PROCESSES = 2
 LONG = (
+    "linuxcnc",
     "s4",
     "full_clock",
     "s0",
