@@ -121,7 +121,8 @@ FIGURES = {
         "each machine on each board that it fits, as `make board` builds it: bitstreams that are "
         "not made or miss the clock of the board at one of three placement seeds; of the Arty A7, "
         "which no open tool places, netlists that are not made; a placement that is in "
-        "docs/placements.toml is made again only if nextpnr sees another circuit, other pins or options",
+        "docs/placements.toml is made again only if nextpnr sees another circuit, other pins or "
+        "options",
         "0",
         Quick({"places": False}, "each machine is fitted to its boards and its files are made"),
         0,
