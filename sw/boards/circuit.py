@@ -53,13 +53,13 @@ def circuit_hash(netlist: Path) -> str:
     for pad, net in pads:
         fixed[net].append(pad)
 
-    nets: dict[int | str, str] = {}
+    nets: dict[int | str, str] = {}  # colours; of a constant the constant
     told_apart = -1
     while told_apart < (now := len(set(colours))):
         told_apart = now
-        for net in ends.keys() | fixed.keys():
-            joined = sorted([*fixed[net], *(colours[cell] + pin for cell, pin in ends[net])])
-            nets[net] = net if isinstance(net, str) else digest(joined)  # a constant is itself
+        for net in {*ends, *fixed}:
+            joined = [*fixed[net], *(colours[cell] + pin for cell, pin in ends[net])]
+            nets[net] = net if isinstance(net, str) else digest(sorted(joined))
         colours = [
             digest([colour, *(pin + nets[net] for pin, net in pins_of_cell)])
             for colour, pins_of_cell in zip(colours, pins)
