@@ -126,7 +126,8 @@ SCOPE_IMAGES = ("axis", "stream")  # whose firmware has its requests
 STREAM_IMAGES = ("stream", "steps_stream")  # whose firmware supervises set-points
 LOCAL_MAC = 0x024D  # the first two bytes of MAC addresses that we choose ourselves
 MOST_ORDERS = 16  # of a relay whose timing and size are known
-MOST_KIB, MOST_FILTERS, MOST_SEGMENTS = 4096, 4, 255  # memory; biquads and segments of an axis
+MOST_KIB, MOST_SEGMENTS = 4096, 255  # memory; segments of an axis
+MOST_FILTERS = 2  # biquads of an axis that have parameters; the engine has room for four
 LEAST_SEGMENTS = 3
 OF_THE_TOP = ("led", "node")  # names that its own pins and signals begin with
 

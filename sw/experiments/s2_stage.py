@@ -35,7 +35,7 @@ from moire.units import Value
 from twin import Twin, TwinTransport
 from twin.nodes.twin import Axis, Node, drives
 
-CLK_HZ = 4_800_000  # the motion engine needs 1171 cycles a tick for three axes
+CLK_HZ = 4_800_000  # a tick has the cycles that the motion engine needs for three axes
 NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 POLL_S = 0.02
 SLOW_MM_S = 0.5  # the paper's top speed, 30 mm/min

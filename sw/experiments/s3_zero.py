@@ -35,7 +35,7 @@ from twin.machines.machine import Trace
 from twin.nodes.twin import Axis, Node, drives
 from twin.parameters import tables as parameters
 
-CLK_HZ = 1_800_000  # the motion engine needs 441 cycles a tick; a count takes more than 20
+CLK_HZ = 1_800_000  # a tick has the cycles that the motion engine needs, a count more than 20
 NODE = {**drives("HAS_DAC"), "FILTERS": 0, "HAS_SINE": 0}
 POLL_S = 0.01  # between two polls of a search
 SEARCHES = 10  # as in table 1 of the paper

@@ -172,16 +172,16 @@ FIGURES = {
 
 
 DIRECTORIES = sorted(path.name for path in (ROOT / "rtl").iterdir() if path.is_dir())
-NODE = "tb/twin/test_twin.py"
+NODE = ("tb/twin/test_twin.py", "tb/system/test_s0_stage.py")  # tests of a node
 Runs = Sequence[tuple[str, Mapping[str, str]]]  # tests and their environment; "": the seed
 RUNS: Runs = [
     *((f"tb/{name}", {"NETLIST": family}) for family in FAMILIES for name in DIRECTORIES),
-    (NODE, {"NETLIST": "ecp5"}),
-    *((f"tb/{name}", {"POWER_UP": ""}) for name in DIRECTORIES),
-    (NODE, {"POWER_UP": ""}),
+    *((tests, {"NETLIST": "ecp5"}) for tests in NODE),
+    *((f"tb/{name}", {"POWER_UP": ""}) for _ in range(POWER_UPS) for name in DIRECTORIES),
+    *((tests, {"POWER_UP": ""}) for _ in range(POWER_UPS) for tests in NODE),
 ]
 CROSSED = (  # where a synchroniser is in what is tested
-    *("tb/common/test_synchroniser.py", "tb/sense", "tb/peripheral", "tb/serial", NODE),
+    *("tb/common/test_synchroniser.py", "tb/sense", "tb/peripheral", "tb/serial", NODE[0]),
     *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "tb" / "system").glob("test_*.py")),
 )
 CROSSINGS_RUNS: Runs = [(tests, {"CROSSINGS": ""}) for _ in range(SEEDS) for tests in CROSSED]
@@ -197,7 +197,7 @@ def tests_of_part(runs: Runs, part: int, seed: int) -> Counts:
 CAMPAIGNS = {
     "netlist": Campaign(
         "tests of the blocks of each directory on the netlists for ECP5 and iCE40, those of a node "
-        "on its netlist, and those of both from random states; failed: tests",
+        f"on its netlist, and those of both from {POWER_UPS} random states; failed: tests",
         partial(tests_of_part, RUNS),
         parts=len(RUNS),
         tried="tests",

@@ -143,6 +143,22 @@ def test_an_index_that_cannot_be_surveyed_is_refused_and_its_gate_remains(axis, 
     assert axis.registers["index"]["each"] == 0 and axis.registers["index"]["gate_mask"] == 3
 
 
+def test_if_the_homing_at_the_end_fails_the_gate_is_as_before(monkeypatch):
+    axis = IndexAxis((2.3, 3.5))
+    axis.write_parameter("index_gate", 2)
+
+    def home(*_):
+        if axis.get_parameter("index_gate").written() not in ("any", "a_high"):
+            raise MotionFailed("limit_low", 1, "the limit switch at the low end")
+        real()
+
+    real = axis.home
+    monkeypatch.setattr(axis, "home", home)
+    with pytest.raises(MotionFailed):
+        survey(axis)
+    assert axis.get_parameter("index_gate").written() == "a_high"
+
+
 def test_an_index_that_its_gate_may_miss_is_reported_with_the_warning():
     causes = set()
     for number in range(40):

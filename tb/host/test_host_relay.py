@@ -24,6 +24,7 @@ from moire.client.relay import (
     RelayRefused,
     Settings,
     identity_of,
+    make_segment_set,
     make_set,
     terms_of,
 )
@@ -208,6 +209,21 @@ def test_too_many_orders_and_no_numbers_are_refused():
         make_set([], Settings(4096), 33)
 
 
+def test_a_set_of_segments_is_that_of_the_model_and_refuses_what_the_relay_would():
+    points = [0.0, 3.5, -2.0, 6.25, 1.0]
+    words = [round(point * 65536) for point in (*points, 0)]
+    model = relay_set.image(list(zip(words[::2], words[1::2])), 4000, segments=5)
+    assert make_segment_set(points, Settings(4000)) == model
+    for wrong, sentence in (
+        ([0.0], "a number of segments of 1 is outside 2 to 64"),
+        ([0.0] * 65, "a number of segments of 65 is outside 2 to 64"),
+        ([0.0, 128.0], "128 counts is not below 128"),
+        ([0.0, math.inf], "no number"),
+    ):
+        with pytest.raises(OutOfRange, match=sentence):
+            make_segment_set(wrong, Settings(4000))
+
+
 def test_status_in_words():
     relay = Relay(FakeRelay(chip=awake_chip()))
     relay.write(a_set())
@@ -376,6 +392,25 @@ def test_relay_calibrate_dry_and_with_a_bad_table_writes_nothing(tmp_path):
     with pytest.raises(BadFile, match="line 3"):
         call(transport, "calibrate", str(table), "--counts", "32768")
     assert transport.sent == 0
+
+
+def test_relay_calibrate_takes_all_settings(tmp_path):
+    transport, table = FakeRelay(chip=awake_chip()), readings_file(tmp_path)
+    words = "--hysteresis 0.5 --filter 3 --edge-separation 24 --index-gate b_high --index-low"
+    call(transport, "calibrate", str(table), "--counts", "32768", *words.split())
+    found = fit(read_readings(table), orders=K)
+    settings = Settings(32768, 24, 0.5, 3, True, 3, 2)
+    expected = make_set(terms_of(found, 32768), settings, K)
+    assert transport.set.identity == identity_of(expected)
+
+
+def test_relay_calibrate_refuses_a_relay_with_segments(tmp_path):
+    transport, table = FakeRelay(chip=awake_chip()), readings_file(tmp_path)
+    transport.k = 0
+    assert "a table of segments" in call(transport, "status")[1]
+    with pytest.raises(OutOfRange, match="by a table of segments, not by harmonics"):
+        call(transport, "calibrate", str(table), "--counts", "32768")
+    assert transport.set.identity == 0
 
 
 def test_status_and_clear_report_flags():

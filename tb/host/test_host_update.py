@@ -160,6 +160,17 @@ def test_the_highest_generation_runs(desk):
     assert desk.power_up().image == 1
 
 
+def test_an_update_that_begins_while_a_block_is_still_being_written_is_the_newest(desk):
+    desk.update(0, 1)
+    ask = desk.board.core.request
+    assert ask("begin_update", bytes=70, crc=1, map_crc=MAP_CRC, memory=65536, axes=8)[0] == "ok"
+    desk.bus.transport.wait(0.1)
+    assert ask("write_update", block=0, **{f"word_{n}": 0 for n in range(8)})[0] == "ok"
+    desk.board.flash.polls = 50
+    desk.update(2)
+    assert desk.power_up().crc == zlib.crc32(PROGRAMS[2])
+
+
 def test_a_block_that_arrives_wrong_is_found_by_its_crc(desk, monkeypatch):
     real = client.write
     monkeypatch.setattr(

@@ -120,7 +120,7 @@ def test_a_clock_that_the_pll_cannot_make_is_refused(tmp_path):
         ('name = "Y"', 'name = "x"', "two axes have the name x, as their pins are in small"),
         ('name = "Y"', 'name = "node"', "[axis 2] name 'node' is taken: signals of the top begin"),
         ("memory_kib = 64", "memory_kib = 0", "[node] memory_kib = 0 must be 1 to 4096"),
-        ("address = 1", "address = 1\nfilters = 8", "[node] filters = 8 must be 0 to 4"),
+        ("address = 1", "address = 1\nfilters = 8", "[node] filters = 8 must be 0 to 2"),
         ("address = 1", "address = 1\nsegments = -1", "[node] segments = -1 must be 0 to 255"),
         ("address = 1", "address = 1\nsegments = 2", "[node] segments = 2: a table has 3 at least"),
         ('name = "Y"', 'name = "Y axis"', "[axis 2] name 'Y axis' must consist of letters"),

@@ -18,7 +18,7 @@ from twin.nodes.twin import drives
 
 FIRST, SECOND, OWN = range(3)
 NODE = {**drives("HAS_BRIDGE"), "FILTERS": 0, "HAS_OWN_CHAIN": 1 << OWN}
-CLK_HZ = 4_800_000  # the motion engine needs 1171 cycles a tick for three axes
+CLK_HZ = 4_800_000  # a tick has the cycles that the motion engine needs for three axes
 PERIOD_M = 0.8e-6
 PLACES = 6  # of a period
 LOOKS = 4  # readings at each position: the noise of one is 0.7 nm

@@ -190,6 +190,7 @@ static uint8_t begin(void) {
     if (update.trial) return BUS_CAUSE_FIRMWARE_ON_TRIAL;
     if (update.state == BUS_UPDATE_STATE_ERASING || update.state == BUS_UPDATE_STATE_STARTING)
         return BUS_CAUSE_NOT_NOW;
+    if (!flash_wait()) return BUS_CAUSE_FLASH_FAILED;  // a block of an update that is given up
     for (unsigned image = 1; image <= IMAGES; image++) {
         struct entry old;
         if (entered(image, &old) && old.generation > newest) newest = old.generation;

@@ -150,7 +150,7 @@ class Survey:
         """Surveys the index, sets index_gate, and homes the axis with it."""
         before = self.axis.get_parameter("index_gate")
         velocity = self.axis.get_parameter("velocity")
-        surveyed = False
+        surveyed = homed = False
         try:
             self.say("searching the index")
             self.axis.write_parameter("index_gate", 0)
@@ -159,14 +159,18 @@ class Survey:
             found = self.measure()
             surveyed = True
         finally:
-            self.restore(before.counts if not surveyed else None, velocity.counts)
+            self.restore(None if surveyed else before.counts, velocity.counts)
         self.say("homing")
         try:
             self.axis.home()
+            homed = True
         except MotionFailed as failed:
             if not found.warnings:
                 raise
             raise NotSurveyed("index_on_edge", found.warning_words) from failed
+        finally:
+            if not homed:
+                self.restore(before.counts, velocity.counts)
         return found
 
     def measure(self) -> IndexSurvey:

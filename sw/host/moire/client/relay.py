@@ -36,6 +36,9 @@ PIECE = LONGEST_BODY - HEAD
 
 MARKER = 0x4D4F4900
 MOST_ORDERS = 32
+SEGMENTS = range(2, 65)  # of a table in place of the orders
+SEGMENTS_MARK = 128  # in the marker of such a set, beside their number
+LARGEST_POINT = (1 << 23) - 1  # of a table, as it is written
 COUNTS = range(1609, (1 << 25) + 1)  # per turn
 GAIN = math.prod(math.sqrt(1 + 4.0**-n) for n in range(22))  # of the rotations in the relay
 LARGEST = (1 << 29) - 1  # sum of the amplitudes, as they are written
@@ -166,6 +169,25 @@ def make_set(terms: Terms, settings: Settings, orders: int) -> bytes:
     )
 
 
+def make_segment_set(points: Sequence[float], settings: Settings) -> bytes:
+    """The bytes of a set for a relay that was built with as many segments as there are points;
+    raises OutOfRange.
+
+    `points` are the errors of the encoder in counts (encoder minus reference) at the beginnings of
+    the segments, which divide the turn from the index on; the relay sends the position less the
+    error, on straight lines between two points.
+    """
+    check_range(len(points), SEGMENTS[0], SEGMENTS[-1], "a number of segments")
+    if not all(math.isfinite(point) for point in points):
+        raise OutOfRange("an error of the table is no number")
+    words = [round(point * 65536) for point in points]
+    for word in words:
+        if abs(word) > LARGEST_POINT:
+            raise OutOfRange(f"an error of {word / 65536:g} counts is not below 128")
+    padding = [0] * (len(words) % 2)
+    return packed(MARKER + SEGMENTS_MARK + len(points), settings, words + padding)
+
+
 def identity_of(whole: bytes) -> int:
     """The identity that a relay reports for this set while it is in force."""
     return int.from_bytes(whole[-CRC_LENGTH:], "little")
@@ -180,7 +202,7 @@ class Status(NamedTuple):
     flags: int
     levels: int
     source: int  # of the set at power-up
-    orders: int  # how many the relay evaluates
+    orders: int  # how many the relay evaluates; 0: it has a table of segments instead
     identity: int  # of the set in force
     position: int  # counts
     correction: float  # counts
@@ -191,11 +213,16 @@ class Status(NamedTuple):
         flags, levels, source, identity, position, correction = struct.unpack("<BBBIii", fields)
         return cls(flags, levels, source & 3, source >> 2, identity, position, correction / 65536)
 
+    @property
+    def corrects_by(self) -> str:
+        """What a set of this relay holds."""
+        return f"{self.orders} orders" if self.orders else "a table of segments"
+
     def words(self) -> str:
         """The state in words, in several lines."""
         levels = [name for bit, name in enumerate(LEVELS) if self.levels >> bit & 1]
         lines = [
-            f"{', '.join(levels) or 'passing the encoder uncorrected'}; {self.orders} orders, "
+            f"{', '.join(levels) or 'passing the encoder uncorrected'}; {self.corrects_by}, "
             f"set {self.identity:08X}, at power-up from {SOURCES[self.source]}",
             f"position {self.position} counts, correction {self.correction:+.3f}",
         ]
@@ -362,7 +389,7 @@ class Relay:
         if status.identity != identity_of(whole):
             raise RelayRefused(
                 f"the relay refused the set {identity_of(whole):08X}; {status.identity:08X} stays "
-                f"in force: is it one for {status.orders} orders?"
+                f"in force: is it one for {status.corrects_by}?"
             )
         return status
 

@@ -9,8 +9,14 @@ from moire.analysis import report
 from moire.cli.files import write_bytes
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
-from moire.cli.values import FILE, NUMBER, POSITIVE
+from moire.cli.values import FILE, NUMBER, POSITIVE, WHOLE
 from moire.client.relay import Relay, Settings, make_set, terms_of
+from moire.client.values import CHOICES
+from moire.errors import OutOfRange
+
+PLAIN = Settings(counts_per_turn=0)  # for the defaults
+# (mask, levels) of B and A, by the words of an axis: any, both_low, a_high, both_high, b_high
+GATES = dict(zip(CHOICES["index_gate"], ((0, 0), (3, 0), (3, 1), (3, 3), (3, 2)), strict=True))
 
 group = Group(
     "relay",
@@ -79,6 +85,36 @@ def clear(call: Call) -> None:
     help="The angle of the reference at the index of the ring. The default is 0.",
 )
 @click.option(
+    "--hysteresis",
+    type=NUMBER,
+    default=PLAIN.hysteresis,
+    metavar="COUNTS",
+    help=f"How far the angle turns back before the output does. The default is {PLAIN.hysteresis}.",
+)
+@click.option(
+    "--filter",
+    "filter_samples",
+    type=WHOLE,
+    default=PLAIN.filter_samples,
+    metavar="SAMPLES",
+    help="For how many samples a level of A, B or Z must last. The default is 0, no filter.",
+)
+@click.option(
+    "--edge-separation",
+    type=WHOLE,
+    default=PLAIN.minimum_edge_separation,
+    metavar="CYCLES",
+    help="The least time between two edges of the output, in cycles of its clock. The default is "
+    f"{PLAIN.minimum_edge_separation}.",
+)
+@click.option(
+    "--index-gate",
+    type=click.Choice(list(GATES)),
+    default="any",
+    help="The levels of A and B at which the index counts. The default is any.",
+)
+@click.option("--index-low", is_flag=True, help="The index is active low.")
+@click.option(
     "--picture", type=FILE, metavar="FILE", help="Draw the error before and after, as PNG."
 )
 @click.option("--dry", is_flag=True, help="Only fit and draw; write nothing to the relay.")
@@ -94,6 +130,11 @@ def calibrate(
     orders: int | None,
     noise: float | None,
     index_at: float,
+    hysteresis: float,
+    filter_samples: int,
+    edge_separation: int,
+    index_gate: str,
+    index_low: bool,
     picture: str | None,
     dry: bool,
     no_flash: bool,
@@ -102,16 +143,26 @@ def calibrate(
     from moire.analysis.harmonic_fit import fit, read_readings  # NumPy only where it is needed
 
     readings = read_readings(file)
+    mask, levels = GATES[index_gate]
+    settings = Settings(
+        counts, edge_separation, hysteresis, filter_samples, index_low, mask, levels
+    )
     relay = None if dry else Relay(call.bus.transport)
+    built = relay.status().orders if relay else 0
+    if relay and not built:
+        raise OutOfRange(
+            "this relay corrects by a table of segments, not by harmonics: make_segment_set of "
+            "moire.client.relay makes its set"
+        )
     if orders is None and relay:
-        orders = min(readings.most_orders, relay.status().orders)
+        orders = min(readings.most_orders, built)
     found = fit(readings, orders=orders, noise=noise)
     if picture:
         write_bytes(picture, draw(readings, found))
     written = "nothing written"
     if relay:
         terms = terms_of(found, counts, index_at)
-        whole = make_set(terms, Settings(counts), relay.status().orders)
+        whole = make_set(terms, settings, built)
         relay.write(whole)
         written = "in force"
         if not no_flash:

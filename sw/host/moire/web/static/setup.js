@@ -33,7 +33,7 @@ export class SetupPanel {
             <div class="row limits"></div> <span role="status"></span></li>
           <li data-step="motor"><b>Direction of the motor, and gains.</b> Switch the power of the motor on, with the axis in
             the middle of its travel and a hand on the emergency stop, and run
-            <code>moire tune --bandwidth 40Hz --write</code>: it says if a positive command moves the axis down.
+            <code>moire tune --method steps --bandwidth 40Hz --write</code>: it says if a positive command moves the axis down.
             <span role="status"></span></li>
           <li data-step="home"><b>Zero.</b> Method 37 takes the present position; the others search a switch or an index.
             <label>Method <select name="method"><option>37</option><option>17</option><option>18</option><option>1</option>
