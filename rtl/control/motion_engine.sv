@@ -11,7 +11,7 @@
 //           2^-40 period; the last step rounds to the LSB of target, a half up. Velocity: distance
 //           by time between the last two steps, in 2^-24 period/tick, within one quantum of the
 //           distance of the tick, and bounded by one quantum over the time without a step from the
-//           second half of a tick on. Motor steps: floor((target + trim + take_up) * step_ratio
+//           first tick without one on. Motor steps: floor((target + trim + take_up) * step_ratio
 //           / 2^32) modulo 2^48.
 // method    One adder of 72 bits, one multiplier of 35 bits and one memory, controlled by the
 //           microcode of tables/engine_microcode.py. A line is fetched, its operand is read in the
