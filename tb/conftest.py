@@ -8,7 +8,8 @@ import os
 import re
 
 from tb.bench import seed
-from twin.build import SHORT_RUNS
+from twin.build import ROOT, SHORT_RUNS
+from twin.netlist import NODE_TESTS
 
 os.environ[SHORT_RUNS] = "1"
 DRAWN = os.environ.get("SEED") == "random"
@@ -19,7 +20,6 @@ SIMULATES = re.compile(
     r"\brun\([^()]*(\([^()]*\))?[^()]*__file__"
 )  # a test of a block has a netlist
 LONG = ("docs", "system", "control", "twin", "peripheral", "netlist")  # folders, the longest first
-NODE_TESTS = ("test_twin.py", "test_s0_stage.py")  # of a node: on its netlist, in random states
 
 
 def of_block(item):
@@ -30,7 +30,7 @@ def of_block(item):
 def on_node(item):
     """Whether a test runs the twin of a node, in a random state or on the netlist: the ECP5's."""
     chosen = os.environ.get("POWER_UP") or os.environ.get("NETLIST") == "ecp5"
-    return bool(chosen) and item.path.name in NODE_TESTS
+    return bool(chosen) and item.path.relative_to(ROOT).as_posix() in NODE_TESTS
 
 
 def pytest_collection_modifyitems(config, items):

@@ -19,7 +19,7 @@ from campaigns.campaign import Campaign, Counts
 from figures.common import Figure, Quick, console
 from figures.synthesis import SynthesisError
 from twin.build import ROOT, SHORT_RUNS
-from twin.netlist import FAMILIES
+from twin.netlist import FAMILIES, NODE_TESTS
 
 BUILD = ROOT / "build" / "netlist"
 LONGEST_S = 24 * 3600
@@ -172,16 +172,15 @@ FIGURES = {
 
 
 DIRECTORIES = sorted(path.name for path in (ROOT / "rtl").iterdir() if path.is_dir())
-NODE = ("tb/twin/test_twin.py", "tb/system/test_s0_stage.py")  # tests of a node
 Runs = Sequence[tuple[str, Mapping[str, str]]]  # tests and their environment; "": the seed
 RUNS: Runs = [
     *((f"tb/{name}", {"NETLIST": family}) for family in FAMILIES for name in DIRECTORIES),
-    *((tests, {"NETLIST": "ecp5"}) for tests in NODE),
+    *((tests, {"NETLIST": "ecp5"}) for tests in NODE_TESTS),
     *((f"tb/{name}", {"POWER_UP": ""}) for _ in range(POWER_UPS) for name in DIRECTORIES),
-    *((tests, {"POWER_UP": ""}) for _ in range(POWER_UPS) for tests in NODE),
+    *((tests, {"POWER_UP": ""}) for _ in range(POWER_UPS) for tests in NODE_TESTS),
 ]
 CROSSED = (  # where a synchroniser is in what is tested
-    *("tb/common/test_synchroniser.py", "tb/sense", "tb/peripheral", "tb/serial", NODE[0]),
+    *("tb/common/test_synchroniser.py", "tb/sense", "tb/peripheral", "tb/serial", NODE_TESTS[0]),
     *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "tb" / "system").glob("test_*.py")),
 )
 CROSSINGS_RUNS: Runs = [(tests, {"CROSSINGS": ""}) for _ in range(SEEDS) for tests in CROSSED]

@@ -29,6 +29,8 @@ BODIES = HERE / "primitives"
 ROOT = HERE.parents[1]
 BUILD = ROOT / "build" / "netlist"
 FAMILIES = ("ecp5", "ice40")  # for which the tests of all blocks run
+# of a node: on its netlist, and from random states
+NODE_TESTS = ("tb/twin/test_twin.py", "tb/system/test_s0_stage.py")
 SUFFIX = "_netlist"  # of the module that Yosys has made, below its wrapper
 TIMING = re.compile(r"^[ \t]*specify\b.*?^[ \t]*endspecify\b", re.MULTILINE | re.DOTALL)
 OURS = {"DP16KD": "dp16kd.vh", "MULT18X18D": "mult18x18d.vh"}

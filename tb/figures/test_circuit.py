@@ -137,7 +137,7 @@ def test_each_other_cell_net_or_pad_makes_another_circuit(hash_of, change):
 
 
 def test_two_like_cells_with_swapped_neighbours_are_told_apart(hash_of):
-    """Chains of four cells each of which only the last is at a pad: near or far is a difference."""
+    """Two chains of four like cells, from pad to pad, are not the same if they cross over."""
     chain = lambda nets, init: [cell("LUT4", init, A=[a], Z=[z]) for a, z in zip(nets, nets[1:])]
     first, second = chain([2, 10, 11, 12, 3], "01"), chain([4, 20, 21, 22, 5], "01")
     ports = {"a": pads("input", 2, 4), "y": pads("output", 3, 5)}

@@ -19,6 +19,16 @@ def design(monkeypatch, tmp_path):
     return fit(board.named("colorlight_i5"), machine.named("mill"))
 
 
+def test_the_circuit_and_what_nextpnr_is_told_are_both_in_the_state_of_a_netlist(
+    design, monkeypatch
+):
+    other = fit(board.named("colorlight_i9"), machine.named("mill"))
+    state = build.netlist_state
+    monkeypatch.setattr(build, "circuit_hash", lambda circuit: circuit)
+    assert state(design, "a") == state(design, "a")
+    assert len({state(design, "a"), state(design, "b"), state(other, "a")}) == 3
+
+
 def test_another_pin_or_board_is_another_placement(design):
     other = fit(board.named("colorlight_i9"), machine.named("mill"))
     assert build.told(other) != build.told(design)
