@@ -113,7 +113,9 @@ def synthesise(design: Design, folder: Path) -> Path:
     if design.ethernet:
         core = (folder / f"{ethernet.NAME}.v").relative_to(ROOT)
         first += f"; read_verilog -lib {FLIP_FLOPS[family.name]}; read_verilog {core}"
-    return yosys(folder / "top.sv", {}, last, f"board-{design.name}", first)
+    netlist = yosys(folder / "top.sv", {}, last, f"board-{design.name}", first)
+    family.finish(netlist)
+    return netlist
 
 
 def chip(design: Design) -> list[str]:
@@ -171,7 +173,7 @@ def state(design: Design) -> str:
     """A hash of all that the placement depends on, except its seed."""
     here = Path(__file__)
     sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", here]
-    sources += [here.with_name(name) for name in ("family.py", "gowin.lock")]
+    sources += [here.with_name(name) for name in ("family.py", "global_reset.py", "gowin.lock")]
     sources.append(Path(inspect.getfile(yosys)))
     sources += ethernet.SOURCES if design.ethernet else ()
     found = hashlib.sha256((design.board.part.synthesis + told(design)).encode())

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from boards import block_ram, clocks
 from boards.clocks import Pll
+from boards.global_reset import put_on_clock_line
 from boards.packages import PACKAGES
 from boards.toml_file import Misfit
 from figures.synthesis import NEXTPNR_ECP5, NEXTPNR_ICE40, TOOLS
@@ -48,6 +49,7 @@ class Family:
     script: str = ""  # for the tool of the vendor, where there is no placer
     fetched: str = ""  # target of make that fetches its tools
     has_tools: Callable[[], bool] = lambda: True  # whether they are there
+    finish: Callable[[Path], None] = lambda netlist: None  # changes a netlist for the placer
 
     @property
     def read_cells(self) -> str:
@@ -135,6 +137,7 @@ FAMILIES = {
                 },
                 block_ram.ECP5,
             ),
+            finish=put_on_clock_line,
         ),
         Family(
             name="ice40",

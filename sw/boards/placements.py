@@ -6,7 +6,7 @@ that it fits takes of the part, and how fast it is with each placement seed.
     make boards K=icebreaker SEEDS=10    those with this in their names, at ten
     make boards MINUTES=90               begins no placement after this time
 
-A placement takes minutes to an hour, all of them many hours. Each result is in the record as soon
+A placement takes minutes, all of them many hours. Each result is in the record as soon
 as it is there, and is measured again, here or elsewhere, only if nextpnr would see another circuit,
 other pins or options: so the hours may be divided among sittings and computers. The figures
 `boards_failed` and `board_small_mhz` read the record and measure what it lacks; docs/boards.md has
