@@ -142,6 +142,7 @@ class Outcome:
     answers: list[tuple[float, str, str]] = field(default_factory=list)
     # the last text on the panel in each state
     displays: dict[str, list[str]] = field(default_factory=dict)
+    spared: bool = False  # the job ended before the power failure that was to come in it
 
     @property
     def uncut(self) -> list[int]:
@@ -178,8 +179,10 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether the job is not complete, or a cut is outside the tolerance."""
-        return not self.complete or self.worst > TOLERANCE
+        """Whether the job is not complete, a cut is outside the tolerance, or nothing is known of a
+        power failure since none came in the job.
+        """
+        return not self.complete or self.worst > TOLERANCE or self.spared
 
     @property
     def words(self) -> str:
@@ -188,6 +191,7 @@ class Outcome:
             f"{len(self.cuts)} cuts for {len(self.stations)} stations, {len(self.uncut)} uncut, "
             f"{len(self.twice)} cut twice, {len(self.outside_tolerance)} elsewhere; "
             f"largest error {self.worst:.2f} arcsec; {self.seconds:.0f} s"
+            + (", without the power failure that was to come" if self.spared else "")
         )
 
 
@@ -421,6 +425,7 @@ class IndexingMachine:
                     (outcome.seconds, f"{state.state}: {state.cause_words}", key)
                 )
                 self.press(key)
+        outcome.spared = dark is not None
         self.twin.run(SHOWN_S)
         outcome.displays[outcome.state.state] = self.panel.lines
         outcome.cuts = self.cuts()

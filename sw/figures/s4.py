@@ -121,7 +121,7 @@ def s4_index_arcsec_max(
 
 def s4_jobs_failed(count: int = JOBS, job: Job = troubled_job, seed: int = 1) -> int:
     """A job fails if a station is not cut or cut twice, if a cut is elsewhere or beyond the
-    tolerance, or if the job does not end.
+    tolerance, if the job does not end, or if it ends before its power cut.
     """
     return sum(outcome.failed for outcome in jobs(job, count, seed))
 

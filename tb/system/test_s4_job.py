@@ -72,6 +72,12 @@ def test_a_job_fails_beyond_the_tolerance_or_without_an_end():
     assert outcome_of().worst == math.inf
 
 
+def test_a_job_that_ends_before_its_power_failure_fails():
+    outcome = outcome_of((0, 0.0, True), (1, 0.0, True))
+    outcome.spared = True
+    assert outcome.failed and "power failure" in outcome.words
+
+
 def test_the_difference_of_two_angles_is_the_shorter_one():
     assert apart(1, 1296000 - 1) == 2 and apart(1296000 - 1, 1) == -2 and apart(3600, 3599.5) == 0.5
 
