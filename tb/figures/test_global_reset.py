@@ -6,7 +6,7 @@ import json
 import pytest
 
 from boards.circuit import TOP, circuit_hash
-from boards.global_reset import BUFFER, FLIP_FLOP, LOADS, RESET, put_on_clock_line
+from boards.global_reset import BUFFER, FLIP_FLOP, RESET, put_on_clock_line
 from figures.synthesis import BUILD, ECP5, NEXTPNR_ECP5, placed, yosys
 
 WIDTH = 40  # flip-flops of the larger of the two resets
@@ -53,7 +53,7 @@ def without_buffers(netlist):
 
 def test_only_the_flip_flops_of_the_large_reset_get_it_from_a_buffer(netlist):
     before = circuit_hash(netlist)
-    put_on_clock_line(netlist, WIDTH)
+    put_on_clock_line(netlist, loads=WIDTH)
     (buffer,) = cells_of(netlist, BUFFER)
     resets = [pins[RESET] for pins in cells_of(netlist, FLIP_FLOP)]
     assert resets.count(buffer["CLKO"]) == WIDTH
@@ -65,13 +65,13 @@ def test_only_the_flip_flops_of_the_large_reset_get_it_from_a_buffer(netlist):
 
 def test_a_netlist_with_smaller_resets_stays_as_it_was(netlist):
     before = netlist.read_bytes()
-    put_on_clock_line(netlist, WIDTH + 1)
-    put_on_clock_line(netlist, LOADS)
+    put_on_clock_line(netlist, loads=WIDTH + 1)
+    put_on_clock_line(netlist)
     assert netlist.read_bytes() == before
 
 
 def test_nextpnr_routes_it_on_the_clock_network(netlist):
-    put_on_clock_line(netlist, WIDTH)
+    put_on_clock_line(netlist, loads=WIDTH)
     placed(netlist, NEXTPNR_ECP5, ECP5, 50, 1, "--lpf-allow-unconstrained")
     log = netlist.with_name("place_and_route.log").read_text()
     assert "routing clock net global_reset" in log
