@@ -51,6 +51,15 @@ def rtl_only(reason):
         pytest.skip(reason)
 
 
+def generated(dut, block, number, name):
+    """A signal in a generate block of the design; in a netlist with mutants the block is a part of
+    its name.
+    """
+    if os.environ.get("MUTANTS"):
+        return dut[f"\\{block}[{number}].{name} "]
+    return getattr(getattr(dut, block)[number], name)
+
+
 def steady_only(reason):
     """In a cocotb test: skip it if a change at a pin may arrive one cycle later, for a reason such
     as a latency to the cycle.

@@ -128,18 +128,27 @@ async def only_a_sensor_on_the_side_of_the_motor_is_corrected(dut):
 @cocotb.test()
 async def any_input_matches_the_model_in_every_cycle(dut):
     screw = await Screw(dut).reset()
-    for _ in range(5000):
-        bits = random.choice((3, 9, 15, 32))
+    for _ in range(8000):
+        bits = random.choice((3, 9, 12, 14, 15, 16, 32))
+        if random.random() < 0.1:
+            screw.inputs |= dict(
+                backlash=random.choice((0, MOST, 100, random.getrandbits(24))),
+                hysteresis=random.choice((0, 1, 127, random.getrandbits(7))),
+            )
+        left = abs((screw.inputs["backlash"] if screw.model.up else 0) - screw.model.take_up)
+        near = max(0, min(MOST, left + random.choice((-1, 0, 1, 2, -300))))
+        # as far back as is no reversal, or farther by one
+        back = max(0, (screw.inputs["hysteresis"] << 8) - screw.model.back + random.getrandbits(1))
+        reverses = -back - 1 if screw.model.up else back
+        power = random.choice((-1, 1)) << random.randrange(31)
         await screw.clk(
-            rst=int(random.random() < 0.01),
+            rst=int(random.random() < 0.005),
             tick=random.getrandbits(1),
-            backlash=random.choice((0, MOST, 100, random.getrandbits(24))),
-            take_up_rate=random.choice((0, 1, 30, random.getrandbits(24))),
-            hysteresis=random.choice((0, 1, 127, random.getrandbits(7))),
+            take_up_rate=random.choice((0, 1, 30, near, random.getrandbits(24))),
             motor_side=random.getrandbits(1),
             valid=random.getrandbits(1),
             kind=random.choice((GIVEN.index("target_velocity"), random.randrange(8))),
-            result=random.randrange(-1 << bits - 1, 1 << bits - 1),
+            result=random.choice((reverses, power, random.randrange(-1 << bits - 1, 1 << bits - 1))),
             position=random.randrange(-(1 << 46), 1 << 46),
         )
 

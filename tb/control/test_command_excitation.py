@@ -28,13 +28,13 @@ IDLE = dict(
 PASSED = ("axis", "period", "running", "limit", "valid", "result_axis", "kind", "result")
 
 
-async def begin(dut):
-    """A waveform of which every value is known."""
+async def begin(dut, values=16):
+    """A waveform of which so many values are known, or all."""
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
     model = CommandExcitation(int(dut.DEPTH.value))
-    for n in range(model.depth):
-        await cycle(dut, model, store=1, store_at=n, store_value=100 * n + 100)
+    for n in range(min(values, model.depth)):
+        await cycle(dut, model, store=1, store_at=n, store_value=min(32767, 100 * n + 100))
     await cycle(dut, model)
     return model
 
@@ -116,27 +116,40 @@ async def other_results_and_other_axes_pass_unchanged(dut):
 
 
 @cocotb.test()
+async def the_longest_periods_use_every_value(dut):
+    model = await begin(dut, 4096)
+    for period in (model.depth, model.depth - 1):
+        for n in (*range(period), 0, 1):
+            assert await command(dut, model, period=period) == min(32767, 100 * n + 100)
+        for _ in range(2):
+            await cycle(dut, model)  # off
+
+
+@cocotb.test()
 async def any_use_matches_the_model_in_every_cycle(dut):
     model, period, axis, since, running = await begin(dut), 0, 0, 9, 1
     for _ in range(4000):
         running ^= random.random() < 0.02
         if random.random() < 0.02:
-            period, axis = random.randrange(model.depth + 1), random.randrange(8)
+            period, axis = random.randrange(min(16, model.depth) + 1), random.randrange(8)
             since = 0
         kind = COMMAND if since >= 3 and random.getrandbits(1) else random.choice([0, 1, 4, 7])
         valid = random.getrandbits(1)
         since = 0 if valid and kind == COMMAND else since + 1
+        limit = random.choice([0, 300, 32767, random.getrandbits(15)])
+        near = random.choice([-limit, limit]) - (model.value or 0)
+        near += random.choice([-1, 0, 1]) << random.randrange(10)
         await cycle(
             dut,
             model,
             axis=axis,
             period=period,
             running=running,
-            limit=random.choice([0, 300, 32767]),
+            limit=limit,
             valid=valid,
             result_axis=random.choice([axis, random.randrange(8)]),
             kind=kind,
-            result=random.randrange(-(1 << 15), 1 << 15),
+            result=random.choice([random.randrange(-(1 << 15), 1 << 15), near]),
             rst=int(random.random() < 0.002),
         )
         if period == 0:
@@ -150,6 +163,6 @@ async def any_use_matches_the_model_in_every_cycle(dut):
             )
 
 
-@pytest.mark.parametrize("depth", [4, 16])
+@pytest.mark.parametrize("depth", [4, 4096])
 def test_command_excitation(depth):
     run("command_excitation", __file__, DEPTH=depth)

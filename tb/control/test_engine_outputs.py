@@ -98,6 +98,7 @@ async def random_results_match_the_model(dut):
             result=random.getrandbits(bits) - random.choice((0, 1 << bits - 1)),
             flag=random.getrandbits(1),
             waits=int(random.random() < 0.1),
+            line_start=int(random.random() < 0.3),
         )
 
 

@@ -103,7 +103,7 @@ async def the_longest_time_is_filtered_exactly(dut):
     await contacts.begin(0)
     await contacts.cycle(1, n=2 * MS)
     contacts.model.stable[0] = 0xFFFD
-    dut.g_input[0].stable.value = 0xFFFD
+    bench.generated(dut, "g_input", 0, "stable").value = 0xFFFD
     assert await contacts.cycle(1, n=5 * MS) in range(2 * MS, 3 * MS + 1)
 
 
