@@ -158,5 +158,26 @@ async def any_steps_match_the_model(dut):
             )
 
 
+@cocotb.test()
+async def any_count_and_any_angle_match_the_model(dut):
+    turn = await Turn(dut).reset()
+    for _ in range(500):
+        bits = random.randint(1, 32)
+        counts = random.choice((1 << bits - 1, (1 << bits) - 1, random.getrandbits(bits)))
+        await turn.clk(index=1, counts_per_turn=counts, angle_per_count=random.getrandbits(48))
+        await turn.clk(step=-1)  # at the highest of these counts
+        for _ in range(random.randrange(3)):
+            await turn.clk(step=-1, angle_per_count=random.getrandbits(48))
+        # the turn ends here, or just before or behind
+        at = turn.model.from_mark
+        near = random.choice((at + 2, at + 1, at, at - 1, at ^ 1 << random.randrange(32)))
+        await turn.clk(counts_per_turn=near % (1 << 32))
+        for _ in range(3):
+            await turn.clk(step=1, angle_per_count=random.getrandbits(48))
+        await turn.clk(index=1)
+        for step in (1, -1):
+            await turn.clk(step=step, angle_per_count=random.getrandbits(48))
+
+
 def test_turn_angle():
     run("turn_angle", __file__)

@@ -107,15 +107,15 @@ async def over_any_number_of_periods_the_driven_time_is_right_to_one_cycle(dut):
             assert abs(driven - exact) < 1
 
 
-async def two_pulses(dut, pin, clk_between):
-    """Await two low pulses on the pin that does not drive: the first is one cycle long, and they
-    are `clk_between` cycles apart. The model does not watch these cycles.
+async def two_pulses(dut, pin, clk_between, clk_long=1):
+    """Await two low pulses on the pin that does not drive: the first is `clk_long` cycles long, and
+    they are `clk_between` cycles apart. The model does not watch these cycles.
     """
     dut.valid.value = 0
     await FallingEdge(pin)
     first = get_sim_time("step")
     await RisingEdge(pin)
-    assert get_sim_time("step") - first == CLK_PS
+    assert get_sim_time("step") - first == CLK_PS * clk_long
     await FallingEdge(pin)
     assert get_sim_time("step") - first == CLK_PS * clk_between
 
@@ -127,12 +127,15 @@ async def the_smallest_command_drives_one_cycle_in_32768(dut):
     await two_pulses(dut, dut.bridge_b, FULL)
 
 
-@cocotb.test(timeout_time=2, timeout_unit="ms")
+@cocotb.test(timeout_time=5, timeout_unit="ms")
 async def the_longest_period_is_65535(dut):
     bridge = await Bridge(dut).reset(period=1)
-    await bridge.give(0)
-    await bridge.clk(valid=1, command=-1, period=65535)  # 65535/32768 cycles per period: 1, then 2
-    await two_pulses(dut, dut.bridge_a, 65535)
+    for command, cycles in ((-1, 1), (-10923, 0x5555), (21846, 0xAAAB)):
+        await bridge.give(0)
+        await bridge.clk(valid=1, command=command, period=65535)
+        await two_pulses(dut, dut.bridge_a if command < 0 else dut.bridge_b, 65535, cycles)
+        await bridge.clk(enable=0)
+        bridge.inputs.update(enable=1, period=1)
 
 
 @cocotb.test()

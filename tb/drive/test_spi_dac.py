@@ -7,11 +7,13 @@ import random
 
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
+from cocotb.utils import get_sim_time
 
 from tb.bench import run, start
 from tb.drive.spi_dac import SpiDac
 
 FULL = 1 << 15
+CLK_PS = 10_000  # a cycle of the clock that start() makes
 IDLE = dict(half_period=1, refresh=65535, trim=0, enable=0, valid=0, command=0)
 
 
@@ -154,6 +156,19 @@ async def the_same_code_is_sent_again_after_refresh(dut):
     dac.chip.codes.clear()
     await dac.run(1000, refresh=65535)
     assert dac.chip.codes == []
+
+
+@cocotb.test()
+async def any_bit_of_refresh_counts(dut):
+    dac = await Dac(dut).reset(enable=1)
+    await dac.give(77)
+    for refresh in (0x5555, 0xAAAA):  # the model does not watch these cycles
+        dut.refresh.value = refresh
+        began = []
+        for _ in range(2):
+            await FallingEdge(dut.cs_n)
+            began.append(get_sim_time("step"))
+        assert began[1] - began[0] == (refresh + 37) * CLK_PS
 
 
 @cocotb.test()

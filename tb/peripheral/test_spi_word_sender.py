@@ -75,7 +75,7 @@ async def one_word_by_hand(dut):
 @cocotb.test()
 async def latency_is_33_half_periods_and_1_and_the_next_word_begins_after_36_and_1(dut):
     wires = await Wires(dut).begin()
-    for half_period in (0, 1, 2, 3, 255):
+    for half_period in (0, 1, 2, 3, 0x55, 0xAA, 255):
         wires.half_period, half = half_period, max(half_period, 1)
         await wires.clk(0xFFFF)
         wires.half_period = 7  # taken with a word

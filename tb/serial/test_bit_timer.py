@@ -72,6 +72,14 @@ async def the_longest_bit_is_timed_as_any_other(dut):
 
 
 @cocotb.test()
+async def any_bit_of_a_long_bit_time_counts(dut):
+    bench = await Bench(dut).begin(0)
+    for bit_time in (0xAAAAA, 0x55555, *(1 << n for n in range(7, 20))):
+        part = bit_time // bench.one
+        assert (await ticks(bench, bit_time, part + 2))[0] == part
+
+
+@cocotb.test()
 async def random_restarts_match_the_model(dut):
     bench = await Bench(dut).begin(128)
     for _ in range(60):

@@ -11,11 +11,13 @@ from fractions import Fraction
 
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
+from cocotb.utils import get_sim_time
 
 from tb.bench import run, start
 from tb.serial.uart_rx import UartRx, character
 from tb.serial.uart_tx import UartTx
 
+CLK_PS = 10_000  # a cycle of the clock that start() makes
 BIT_TIMES = [128, 133, 256, 271, 555]  # 1/16 cycle: 8 cycles, …, 115 200 baud at 4 MHz
 
 
@@ -153,6 +155,14 @@ async def less_than_8_cycles_count_as_8_more_and_the_longest_bit_does_not_overfl
         ]
     await begin(dut, (1 << 20) - 1)
     assert set(await send(dut, [(0, 0)], (1 << 20) - 1, clks=300)) == {(1, 1)}
+    for bit_time in (0x55555, 0xAAAAA):  # any bit of bit_time counts
+        await begin(dut, bit_time)
+        dut.bit_time.value, dut.valid.value, dut.data.value = bit_time, 1, 1
+        await FallingEdge(dut.tx)
+        began = get_sim_time("step")
+        await RisingEdge(dut.tx)
+        assert abs((get_sim_time("step") - began) / CLK_PS - bit_time / 16) <= 1
+        dut.valid.value = 0
 
 
 @cocotb.test()
