@@ -206,6 +206,13 @@ def test_methods_17_and_18_take_the_edge_of_the_switch(method, low, high, sign, 
     assert ended == "ok" and 0 <= sign * (zero_of(machine) - edge) <= PERIOD
 
 
+@pytest.mark.parametrize(("method", "ends"), [(17, {"low": -400}), (18, {"high": 400})])
+def test_a_switch_is_searched_over_the_whole_travel_however_short_home_distance_is(method, ends):
+    axis = Axis(**{name: position * PERIOD for name, position in ends.items()})
+    ended, machine = home(axis, method, home_distance=20 * PERIOD)
+    assert ended == "ok" and 399 * PERIOD < abs(zero_of(machine)) < 401 * PERIOD
+
+
 def test_a_switch_that_opens_while_the_axis_stops_is_approached_again():
     axis = Axis(low=-70 * PERIOD)
 

@@ -226,7 +226,7 @@ async def the_longest_bit_is_timed_as_any_other(dut):
 
 @cocotb.test()
 async def noise_matches_the_model(dut):
-    for bit_time in (*BIT_TIMES, *(random.randrange(1 << 10, 1 << 12) for _ in range(4))):
+    for bit_time in (*BIT_TIMES, 0x555, 0xAAA):
         await quiet(dut, bit_time)
         model, levels = UartRx(), []
         for _ in range(4):
