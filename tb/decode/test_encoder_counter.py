@@ -269,6 +269,22 @@ async def reset_in_mid_flow_forgets_all_but_the_pins(dut):
 
 
 @cocotb.test()
+async def settings_and_pins_in_the_first_cycles_after_a_reset_match_the_model(dut):
+    bench, bits = await Bench.begin(dut), random.getrandbits
+    for _ in range(80):
+        bench.z = bits(1)
+        await bench.cycle(rst=1)
+        await bench.write(2, bits(32) & 0x0001F3F1 | UP | EACH)
+        direction = random.choice([-1, 1])
+        for n in range(12):
+            bench.position += direction
+            bench.z = bits(1)
+            await bench.cycle(**(dict(select=1, write=1, word=1, wdata=ARM) if n == 0 else {}))
+        await bench.flags()
+        await bench.latched()
+
+
+@cocotb.test()
 async def any_pins_and_accesses_match_the_model_in_every_cycle(dut):
     bench, bits = await Bench.begin(dut), random.getrandbits
     for _ in range(100):

@@ -4,6 +4,7 @@ inputs against the model.
 """
 
 import random
+from itertools import combinations
 
 import cocotb
 from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
@@ -158,6 +159,17 @@ async def the_drive_is_never_enabled_while_a_cause_is_present(dut):
             assert (out["enabled"], out["faults"]) == (0, bit)
         await interlock.clk(enable_request=0, **{name: 0})
         await interlock.clk(reset_faults=1)
+
+
+@cocotb.test()
+async def of_any_two_causes_at_once_first_fault_is_the_lower_bit(dut):
+    interlock = await Interlock(dut).reset()
+    for one, other in combinations(CAUSES, 2):
+        await interlock.enable()
+        out = await interlock.clk(**{one: 1, other: 1})
+        both = CAUSES[one], CAUSES[other]
+        assert (out["faults"], out["first_fault"]) == (sum(both), min(both)), (one, other)
+        await interlock.clk(**{one: 0, other: 0})
 
 
 @cocotb.test()
