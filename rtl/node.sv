@@ -7,9 +7,9 @@
 // behaviour  The HAS_... parameters of axes are masks: bit n builds the feature in axis n, and bits
 //            from AXES up are ignored, so 255 means all axes and 0 none. FILTERS and SEGMENTS are
 //            sizes, for the axes whose bit is set in HAS_FILTERS or HAS_SEGMENTS. A mask that is
-//            not given equals the mask that it needs. A feature without what it needs stops the
-//            build, with the rule as the message, and so do more axes and filters than
-//            motion_engine can serve in the cycles of a servo tick, CLK_HZ / TICK_HZ.
+//            not given has its default below. A feature without what it needs stops the build, with
+//            the rule as the message, and so do more axes and filters than motion_engine can serve
+//            in the cycles of a servo tick, CLK_HZ / TICK_HZ.
 // source   S0: one slave computer per axis, many on one bus; here one node may have several axes
 // model    the models of its blocks; tested together by tb/system
 `default_nettype none

@@ -10,7 +10,7 @@
 //           sender is not missed.
 // behaviour data and ninth stay as they are for two bit times from valid on.
 // limits    bit_time from PARTS cycles up; as many are added to less. From 16 cycles up the two
-//           ends may differ by 4 % of the bit time.
+//           ends may differ by 3.8 % of the bit time.
 // source    S0: the 9th bit marks command bytes
 // model     tb/serial/uart_rx.py, equal in every bit of every cycle
 // proved    A start bit ends once: as a character, as a framing error, or as a glitch.
