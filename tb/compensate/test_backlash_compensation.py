@@ -141,6 +141,7 @@ async def any_input_matches_the_model_in_every_cycle(dut):
         back = max(0, (screw.inputs["hysteresis"] << 8) - screw.model.back + random.getrandbits(1))
         reverses = -back - 1 if screw.model.up else back
         power = random.choice((-1, 1)) << random.randrange(31)
+        any_distance = random.randrange(-1 << bits - 1, 1 << bits - 1)
         await screw.clk(
             rst=int(random.random() < 0.005),
             tick=random.getrandbits(1),
@@ -148,7 +149,7 @@ async def any_input_matches_the_model_in_every_cycle(dut):
             motor_side=random.getrandbits(1),
             valid=random.getrandbits(1),
             kind=random.choice((GIVEN.index("target_velocity"), random.randrange(8))),
-            result=random.choice((reverses, power, random.randrange(-1 << bits - 1, 1 << bits - 1))),
+            result=random.choice((reverses, power, any_distance)),
             position=random.randrange(-(1 << 46), 1 << 46),
         )
 
