@@ -21,8 +21,10 @@ from pathlib import Path
 import pytest
 from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
+from cocotb.utils import get_sim_time
 
 ROOT = Path(__file__).resolve().parent.parent
+CLK_NS = 10  # a cycle of the clock that start() makes
 
 
 def seed():
@@ -78,7 +80,12 @@ def needs(condition, reason):
         pytest.skip(reason)
 
 
-async def start(dut, period_ns=10, **inputs):
+def clk_now():
+    """Whole cycles of the clock of start() since the simulation began."""
+    return round(get_sim_time("ps")) // (1000 * CLK_NS)
+
+
+async def start(dut, period_ns=CLK_NS, **inputs):
     """Clock running, inputs at the given levels, two cycles of reset; returns just after reset
     falls. With POWER_UP in the environment, the reset takes two to nine cycles and comes up to 15
     cycles after the clock.

@@ -28,13 +28,18 @@ IDLE = dict(
 PASSED = ("axis", "period", "running", "limit", "valid", "result_axis", "kind", "result")
 
 
+def known(n):
+    """A value of the waveform."""
+    return min(32767, 100 * n + 100)
+
+
 async def begin(dut, values=16):
     """A waveform of which so many values are known, or all."""
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
     model = CommandExcitation(int(dut.DEPTH.value))
     for n in range(min(values, model.depth)):
-        await cycle(dut, model, store=1, store_at=n, store_value=min(32767, 100 * n + 100))
+        await cycle(dut, model, store=1, store_at=n, store_value=known(n))
     await cycle(dut, model)
     return model
 
@@ -121,7 +126,7 @@ async def the_longest_periods_use_every_value(dut):
     longest = model.depth
     for period in (longest, longest - 1, longest // 3, longest * 2 // 3):
         for n in (*range(period), 0):
-            assert await command(dut, model, period=period) == min(32767, 100 * n + 100)
+            assert await command(dut, model, period=period) == known(n)
         for _ in range(2):
             await cycle(dut, model)  # off
 
