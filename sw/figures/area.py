@@ -12,7 +12,6 @@ from pathlib import Path
 
 from boards import board
 from boards.family import Part
-from boards.global_reset import put_on_clock_line
 from figures.common import Figure, console
 from figures.synthesis import (
     ECP5,
@@ -129,7 +128,6 @@ def axis_sine_lut(place: bool = True) -> float:
 def on_ecp5(parameters: tuple[tuple[str, int | str], ...], seed: int) -> dict[str, float]:
     """{lut, fmax_mhz} of a node on an LFE5U-25F-6, the worst of some placements."""
     netlist = netlist_of(source_of("node"), dict(parameters), "ecp5", 1)
-    put_on_clock_line(netlist, "node")
     more = ("--lpf-allow-unconstrained", "--out-of-context")
     tries = placements(netlist, NEXTPNR_ECP5, ECP5, TARGET_MHZ, seed, *more)
     used = tries[0][1]
