@@ -173,6 +173,54 @@ async def z_is_high_for_one_count_once_a_turn_in_both_directions(dut):
 
 
 @cocotb.test()
+async def every_bit_of_a_turn_counts(dut):
+    encoder = await Encoder(dut).reset()
+    whole, least = 1 << encoder.w, 4
+    turns = [(1 << bit) + more for bit in range(2, encoder.w - 1) for more in (0, 1)]
+    for turn in turns + [random.randrange(least, whole // 2) for _ in range(32)]:
+        mark = random.randrange(4 - whole // 2, whole // 2 - 4)
+        for at, all_steps in (
+            (mark - 2, (2, -1, 2, -2)),
+            (mark + 1 - turn, (-1, 1, -1, -2)),  # above the mark before
+        ):
+            await encoder.at(at, load=1, home_position=at % whole, counts_per_turn=turn)
+            await encoder.clk(2)
+            await encoder.clk(3, home=1, home_position=mark % whole)
+            for steps in all_steps:
+                at += steps
+                await encoder.at(at)
+                pins = await encoder.clk(5)
+                assert pins[2] == ((at - mark) % turn == 0), (turn, mark, at)
+
+
+@cocotb.test()
+async def every_bit_of_the_distance_and_the_position_counts(dut):
+    encoder = await Encoder(dut).reset()
+    whole = 1 << encoder.w
+    for bit in range(encoder.w - 1):
+        for begin, goal in (
+            (0, 1 + (1 << bit)),
+            (0, -1 << bit),
+            ((1 << bit) - 1, 1 << bit),
+            (1 << bit, (1 << bit) - 1),
+        ):
+            await encoder.clk(load=1, home_position=begin % whole)
+            await encoder.at(goal)
+            await encoder.clk(8)
+            assert encoder.position == begin + max(-8, min(8, goal - begin))
+
+
+@cocotb.test()
+async def every_bit_of_the_separation_counts(dut):
+    for bit in range(2, 16):
+        for more in (0, 2):
+            encoder = await Encoder(dut).reset(minimum_edge_separation=(1 << bit) + more)
+            await encoder.at(9)
+            await encoder.clk(4)
+            assert encoder.position == 1  # the next edge is allowed later
+
+
+@cocotb.test()
 async def z_stays_low_without_counts_per_turn(dut):
     encoder = await Encoder(dut).reset()
     await encoder.clk(home=1, home_position=0)

@@ -181,6 +181,31 @@ async def pulse_and_gap_have_their_lengths_and_0_acts_as_1(dut):
 
 
 @cocotb.test()
+async def every_bit_of_the_lengths_counts(dut):
+    compare = await begin(dut)
+    for bit in range(3, 24):
+        for long, short in (("pulse_length", "gap_length"), ("gap_length", "pulse_length")):
+            await compare.arm(start=1, step=1, **{long: 2 + (1 << bit), short: 1})
+            await compare.ride([0, 100])
+            seen = await compare.idle(10)  # the long one lasts until the reset
+            assert seen[1:] == [1, *[int(long == "pulse_length")] * 8]
+            await compare.cycle(rst=1)
+
+
+@cocotb.test()
+async def every_bit_of_the_point_counts(dut):
+    compare = await begin(dut)
+    for bit in range(47):
+        for start in (1 << bit, -1 << bit):
+            for step in (1, -1):
+                await compare.arm(start=start, step=step << bit)
+                await compare.ride([start + n * step for n in (-2, -1, 0)], 3)
+                assert compare.pulses == 1
+                await compare.ride([wrapped(start + (step << bit) + n * step) for n in (-1, 0)], 3)
+                assert compare.pulses == 2
+
+
+@cocotb.test()
 async def the_count_ends_the_points_and_count_0_has_no_end(dut):
     compare = await begin(dut)
     for count, want in ((1, 1), (7, 7), (0, 200)):
@@ -229,6 +254,17 @@ async def a_shift_leaves_the_points_on_the_scale(dut):
     far = wrapped(7 * PERIOD - (1 << 47))
     await compare.ride([999 + far, 1000 + far, 2000 + far], 5)
     assert compare.pulses == 2
+
+
+@cocotb.test()
+async def a_position_with_arm_is_not_one_since_arm(dut):
+    compare = await begin(dut)
+    compare.settings = dict(start=1000, step=1000)
+    await compare.cycle(arm=1, valid=1, position=999)
+    await compare.ride([1000, 1999], 5)
+    assert compare.pulses == 0
+    await compare.ride([999, 1000], 5)
+    assert compare.pulses == 1
 
 
 @cocotb.test()
