@@ -18,6 +18,7 @@ class Remover:
     def __init__(self, dut):
         self.dut, self.w = dut, int(dut.W.value)
         self.model, self.top, self.expected = PeakOffsetTracker(self.w), (1 << self.w - 1) - 1, []
+        self.last = None  # outputs of the last sample that was done
 
     async def cycle(self, sin=0, cos=0, valid=1, enable=1, rst=0):
         """Advance design and model by one cycle; return (sin_out, cos_out, sin_offset, cos_offset)
@@ -41,16 +42,19 @@ class Remover:
         )
         if rst:
             self.model, self.expected, want = PeakOffsetTracker(self.w), [], None
-        got = (
-            tuple(
-                getattr(dut, name).value.to_signed()
-                for name in ("sin_out", "cos_out", "sin_offset", "cos_offset")
-            )
-            if int(dut.done.value)
-            else None
-        )
-        assert got == want, f"{got}, the model has {want}"
-        return got
+            self.last = None
+        if not int(dut.done.value):
+            assert want is None, f"not done, the model has {want}"
+            assert self.last is None or self.outputs() == self.last, "they last until the next done"
+            return None
+        self.last = self.outputs()
+        assert self.last == want, f"{self.last}, the model has {want}"
+        return self.last
+
+    def outputs(self):
+        """(sin_out, cos_out, sin_offset, cos_offset) at this time."""
+        names = ("sin_out", "cos_out", "sin_offset", "cos_offset")
+        return tuple(getattr(self.dut, name).value.to_signed() for name in names)
 
     async def feed(self, samples, **settings):
         out = [await self.cycle(sin, cos, **settings) for sin, cos in samples]
