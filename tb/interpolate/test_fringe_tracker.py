@@ -30,8 +30,9 @@ async def again(dut):
 async def clock(dut, valid, phase, axis=0):
     """Advance one cycle; returns done, step, overspeed."""
     dut.valid.value, dut.phase.value, dut.axis.value = valid, phase % 65536, axis
+    before = dut.phase_out.value
     await FallingEdge(dut.clk)
-    assert not int(dut.done.value) or dut.phase_out.value == phase % 65536
+    assert dut.phase_out.value == (phase % 65536 if valid else before)
     return int(dut.done.value), dut.step.value.to_signed(), int(dut.overspeed.value)
 
 
@@ -91,6 +92,24 @@ async def a_quarter_period_from_the_predicted_phase_is_an_overspeed(dut):
     for jump, strobe in ((QUARTER - 1, 0), (QUARTER, 1), (1 - QUARTER, 0), (-QUARTER, 1)):
         await again(dut)
         assert (await feed(dut, [7, 7, 7 + jump]))[2] == (jump, strobe)
+
+
+@cocotb.test()
+async def the_limit_of_a_quarter_period_is_exact_at_any_speed(dut):
+    await begin(dut)
+    for n in range(1500):
+        await again(dut)
+        model, axis = FringeTracker(), n % int(dut.AXES.value)
+        speed, where = random.randrange(1 - QUARTER, QUARTER), random.getrandbits(16)
+        for _ in range(random.choice((0, 3))):  # the prediction is beyond half a period then
+            where += speed
+            speed += (QUARTER - 1) * (1 if speed > 0 else -1)
+        phases = [where + n * speed for n in range(6)]
+        for bad in (3, 4):
+            phases[bad] += random.choice((1, -1)) * (QUARTER + random.randrange(-1, 2))
+        for phase in phases:
+            want = model.step(1, phase % 65536)
+            assert await clock(dut, 1, phase, axis) == want, (phases, phase)
 
 
 @cocotb.test()
