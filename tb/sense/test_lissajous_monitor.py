@@ -179,6 +179,24 @@ async def offset_balance_and_quadrature_faults_are_high_only_beyond_their_limits
 
 
 @cocotb.test()
+async def every_bit_of_the_limits_counts(dut):
+    bits = int(dut.R.value)
+    middle = (1 << bits - 1) - 1
+    for limit in (1 << bit for bit in range(bits - 1)):
+        low, high = middle - limit // 2, middle - limit // 2 + limit
+        for name, output, lengths, most in (
+            ("offset_limit", 2, [middle + limit, *[middle] * 3, middle - limit, *[middle] * 3], 0),
+            ("balance_limit", 3, [high, middle, low, middle] * 2, 0),
+            ("quadrature_limit", 4, [middle, high, middle, low] * 2, 1),
+        ):
+            for more in (0, 1):
+                lengths[most] += more
+                model = await begin(dut, **{name: limit})
+                verdict = await turn(dut, model, lengths, times=4)
+                assert verdict[0] == 1 and verdict[output] == more and sum(verdict[1:]) == more
+
+
+@cocotb.test()
 async def a_circle_that_changes_is_learned_within_four_turns(dut):
     model = await begin(dut, tolerance=5)
     await turn(dut, model, [100] * 8, times=2)
