@@ -37,6 +37,7 @@ TICK_S = 1 / 4000
 WATCHDOG_S = 0.04
 ANSWER_S = 0.01  # that the longest answer takes on the bus, after its request
 CORE_SILENCE_S = 0.02 + 1_200_000 / CLK_HZ  # the node's watchdog of its soft core
+IDLE_S = 0.05  # until the round of the firmware that set a parameter has ended
 ROUND_S = 0.005  # a request on the bus, and the round of the firmware that finds it
 # nm between the position reported last and the latched one, beyond what the axis moves while it
 # holds: a cut signal has any phase, half a period off at most
@@ -222,6 +223,7 @@ def core_fault(twin: Twin, axis: BusAxis, kind: str) -> str | None:
     """What was wrong with a soft core that stops, None if nothing was."""
     later = f"{2 * CORE_SILENCE_S:.1f}s"  # the bus watchdog is not to be the first
     axis.set_parameter("watchdog_time", later)
+    twin.run(IDLE_S)
     begun = twin.time()
     if answers(axis, "reset_faults"):
         return "the soft core still answers"
