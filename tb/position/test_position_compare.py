@@ -196,12 +196,12 @@ async def every_bit_of_the_lengths_counts(dut):
 async def every_bit_of_the_point_counts(dut):
     compare = await begin(dut)
     for bit in range(47):
-        for start in (1 << bit, -1 << bit):
+        for first in (1 << bit, -1 << bit):
             for step in (1, -1):
-                await compare.arm(start=start, step=step << bit)
-                await compare.ride([start + n * step for n in (-2, -1, 0)], 3)
+                await compare.arm(start=first, step=step << bit)
+                await compare.ride([first + n * step for n in (-2, -1, 0)], 3)
                 assert compare.pulses == 1
-                await compare.ride([wrapped(start + (step << bit) + n * step) for n in (-1, 0)], 3)
+                await compare.ride([wrapped(first + (step << bit) + n * step) for n in (-1, 0)], 3)
                 assert compare.pulses == 2
 
 
