@@ -105,12 +105,14 @@ def build_s0() -> None:
 
 
 # Processor time of the parts of a run, from runs on a core of 2 GHz; only for an estimate.
-HOME_S, MOVE_S, CALIBRATE_S, SEGMENT_S = 2.5, 0.25, 11.0, 0.5
+HOME_S, MOVE_S, WAY_S_MM, CALIBRATE_S, SEGMENT_S = 2.5, 0.4, 0.5, 11.0, 0.5
 
 
 def expected_s0(measure: Measure) -> float:
     calibrate = (CALIBRATE_S + HOME_S) * measure.calibrated
-    return HOME_S + MOVE_S * measure.moves + calibrate + SEGMENT_S * measure.segments
+    way_mm = measure.travel_nm / 3e6  # to another place of the travel, on average
+    moves = (MOVE_S + WAY_S_MM * way_mm) * measure.moves
+    return HOME_S + moves + calibrate + SEGMENT_S * measure.segments
 
 
 MACHINES = {
