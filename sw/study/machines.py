@@ -110,7 +110,7 @@ HOME_S, MOVE_S, WAY_S_MM, CALIBRATE_S, SEGMENT_S = 2.5, 0.4, 0.5, 11.0, 0.5
 
 def expected_s0(measure: Measure) -> float:
     calibrate = (CALIBRATE_S + HOME_S) * measure.calibrated
-    way_mm = measure.travel_nm / 3e6  # to another place of the travel, on average
+    way_mm = measure.travel_nm / 1e6 / 3  # to another place of the travel, on average
     moves = (MOVE_S + WAY_S_MM * way_mm) * measure.moves
     return HOME_S + moves + calibrate + SEGMENT_S * measure.segments
 

@@ -100,12 +100,12 @@ async def the_limit_of_a_quarter_period_is_exact_at_any_speed(dut):
     for n in range(1500):
         await again(dut)
         model, axis = FringeTracker(), n % int(dut.AXES.value)
-        speed, where = random.randrange(1 - QUARTER, QUARTER), random.getrandbits(16)
-        for _ in range(random.choice((0, 3))):  # the prediction is beyond half a period then
-            where += speed
+        speed, phases = random.randrange(1 - QUARTER, QUARTER), [random.getrandbits(16)]
+        for _ in range(random.choice((0, 3))):  # up to nearly a period a sample
+            phases.append(phases[-1] + speed)
             speed += (QUARTER - 1) * (1 if speed > 0 else -1)
-        phases = [where + n * speed for n in range(6)]
-        for bad in (3, 4):
+        phases += [phases[-1] + n * speed for n in range(1, 6)]
+        for bad in (-3, -2):
             phases[bad] += random.choice((1, -1)) * (QUARTER + random.randrange(-1, 2))
         for phase in phases:
             want = model.step(1, phase % 65536)
