@@ -56,7 +56,8 @@ module node #(
     parameter int MEMORY_BYTES = 98304,  // bytes of the soft core, program and data
     parameter FIRMWARE = "",  // file of its contents at power-up
     parameter int PROGRAM_BYTES = 32768,  // bytes that a serial core copies, a power of two
-    parameter int FLASH_START = 131072,  // byte address of its firmware in the flash
+    parameter int CODE_BYTES = 0,  // of a soft core: bytes of its program in the flash; 0: none
+    parameter int FLASH_START = 131072,  // byte address of the firmware in the flash
     parameter int HAS_UPDATE = 0,  // 1: a serial core can write new firmware into the flash
     parameter REGISTER_STYLE = "auto",  // ram_style of the memory of the settings
     parameter QUEUE_STYLE = "distributed"  // ram_style of the queues of the bus
@@ -90,7 +91,7 @@ module node #(
     output logic [      47:0] udp_tx_receiver,      // IP address, UDP port in bits 15:0
     output logic [      15:0] udp_tx_length,        // bytes of the datagram
     input  wire               udp_tx_ready,         // level, synchronous to clk: the byte is taken
-    // flash of a serial core
+    // flash of a serial core, or of a soft core with CODE_BYTES
     output logic              flash_cs_n,           // pin, low during a command
     output logic              flash_sclk,           // pin, idles low
     output logic              flash_mosi,           // pin, data to the flash
@@ -252,7 +253,9 @@ module node #(
     end else begin : g_core
         soft_core #(
             .MEMORY_BYTES(MEMORY_BYTES),
-            .FIRMWARE    (FIRMWARE)
+            .FIRMWARE    (FIRMWARE),
+            .CODE_BYTES  (CODE_BYTES),
+            .CODE_START  (FLASH_START)
         ) u_core (
             .clk,
             .rst,
@@ -263,11 +266,13 @@ module node #(
             .address(master_address[15:0]),
             .wdata  (master_wdata[31:0]),
             .rdata,
-            .trap
+            .trap,
+            // flash
+            .flash_cs_n,
+            .flash_sclk,
+            .flash_mosi,
+            .flash_miso
         );
-        assign {flash_cs_n, flash_sclk, flash_mosi} = 3'b100;
-
-        wire unused = &{1'b0, flash_miso};
     end
     register_arbiter #(
         .MASTERS(MASTERS),

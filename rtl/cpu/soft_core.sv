@@ -4,13 +4,16 @@
 // latency   0 wait cycles for a write to memory, 1 wait cycle for a word read from memory; 0 wait
 //           cycles for an instruction that the memory has read ahead, 1 wait cycle for the second
 //           half of one that it has not, 2 for any other one; 3 wait cycles for an access to a
-//           register, and as many more as ready is low.
+//           register, and as many more as ready is low. In the flash: 2 wait cycles for a word of a
+//           line that is kept, 580 for another one (code_cache).
 // rate      An operation takes 3 cycles, a write to memory 5, a word read from memory or a product
 //           6, a register access 8, a quotient 38.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
-//           8000_0000 (64 KiB, whole words only). Any other access, a misaligned access and an
-//           illegal instruction stop the core: trap is high until rst, which starts the core at
-//           address 0 and leaves the memory as it is. While an access is under way and does not use
+//           8000_0000 (64 KiB, whole words only). With CODE_BYTES, what is in the flash from
+//           CODE_START on is at 2000_0000, to be executed and read. Any other access, a misaligned
+//           access and an illegal instruction stop the core: trap is high until rst, which starts
+//           the core at address 0 and leaves the memory as it is.
+//           While an access is under way and does not use
 //           the memory, the memory reads the word after the last instruction. Between two accesses
 //           it reads where the core's operand points, which is the address of the next word of data
 //           if the core begins to read one. So every address of the memory comes from a register:
@@ -23,25 +26,33 @@
 //           of the registers, only one cycle after ready was high, never for an instruction, and
 //           never in two cycles that follow each other; address and wdata are there one cycle
 //           before it. Each word that the core takes from the memory was read at the address of the
-//           access, after the last write to that address.
-// proof     depth 12, MEMORY_BYTES = 1024
+//           access, after the last write to that address; each word from the flash is the one that
+//           code_cache has found.
+// proof     depth 12, MEMORY_BYTES = 1024, CODE_BYTES = 8192
 `default_nettype none
 
 module soft_core #(
     parameter int MEMORY_BYTES = 32768,  // bytes, a multiple of 1024
-    parameter     FIRMWARE     = ""      // name of a file, see node_memory
+    parameter     FIRMWARE     = "",     // name of a file, see node_memory
+    parameter int CODE_BYTES   = 0,      // bytes of program in the flash, see code_cache; 0: none
+    parameter int CODE_START   = 131072  // byte address of the first of them in the flash
 ) (
     input  wire         clk,
     input  wire         rst,
-    output logic        request,  // level: an access waits for ready
-    input  wire         ready,    // level: the registers take an access in the next cycle
-    output logic        select,   // strobe: one access to the registers
-    output logic        write,    // level: with select, wdata is to be written
+    output logic        request,     // level: an access waits for ready
+    input  wire         ready,       // level: the registers take an access in the next cycle
+    output logic        select,      // strobe: one access to the registers
+    output logic        write,       // level: with select, wdata is to be written
     // from 1 cycle before select on; 0 while the core accesses no register
-    output logic [15:0] address,  // byte address of a register
-    output logic [31:0] wdata,    // word to be written
-    input  wire  [31:0] rdata,    // word read, 2 cycles after select
-    output logic        trap      // level: the core has stopped
+    output logic [15:0] address,     // byte address of a register
+    output logic [31:0] wdata,       // word to be written
+    input  wire  [31:0] rdata,       // word read, 2 cycles after select
+    output logic        trap,        // level: the core has stopped
+    // flash
+    output logic        flash_cs_n,  // pin, low during a command
+    output logic        flash_sclk,  // pin, idles low
+    output logic        flash_mosi,  // pin, data to the flash
+    input  wire         flash_miso   // pin, data of the flash, synchronous to flash_sclk
 );
     localparam int A = $clog2(MEMORY_BYTES);
 
@@ -64,9 +75,13 @@ module soft_core #(
     logic has_core, has_ahead;  // `word` is for the core; and it was read ahead
     logic storing;  // the core writes to the memory
     logic [A-3:0] next;  // number of the word after the last instruction
+    wire found;  // code_word is the one that the core asks for
+    wire [31:0] code_word;
 
     wire in_memory = mem_addr < 32'(MEMORY_BYTES);
     wire in_registers = mem_addr[31:16] == 16'h8000 && !mem_instr && (&mem_wstrb || ~|mem_wstrb);
+    wire in_code = CODE_BYTES != 0 && mem_addr[31:28] == 4'h2 && mem_addr[27:0] < 28'(CODE_BYTES) &&
+        mem_wstrb == '0;
     wire la_in_memory = mem_la_addr < 32'(MEMORY_BYTES);
 
     // A word that is read passes through a register, since the block RAMs, the selection among them
@@ -75,7 +90,7 @@ module soft_core #(
     wire same = mem_la_addr[A-1:2] == following;
     wire passes = first && mem_instr;  // `following` is no longer `next`
     wire arrives = (begun && (coming || (direct && !mem_instr))) || sought;
-    wire overwrites = arrives || (storing && mem_addr[A-1:2] == next);
+    wire overwrites = arrives || found || (storing && mem_addr[A-1:2] == next);
     wire known = (fresh || held) && !passes && !overwrites;
     wire seek = begun && !arrives;
     wire [A-3:0] under_way = seek ? mem_addr[A-1:2] : following;
@@ -103,10 +118,11 @@ module soft_core #(
         fresh     <= mem_valid && !seek && !storing;
         held      <= known;
         storing   <= mem_la_write && la_in_memory && !core_trap;
-        has_core  <= arrives && mem_valid && !mem_ready;
+        has_core  <= (arrives && mem_valid && !mem_ready) || found;
         has_ahead <= mem_la_read && la_in_memory && same && known;
-        if (arrives || fresh) word <= memory_rdata;
-        if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
+        if (found) word <= code_word;
+        else if (arrives || fresh) word <= memory_rdata;
+        if (mem_valid && !in_memory && !in_registers && !in_code) lost <= 1'b1;
         if (rst) begin
             select    <= 1'b0;
             awaited   <= 1'b0;
@@ -136,6 +152,30 @@ module soft_core #(
         .read_address,
         .rdata        (memory_rdata)
     );
+
+    if (CODE_BYTES != 0) begin : g_code
+        code_cache #(
+            .BYTES(CODE_BYTES),
+            .START(CODE_START)
+        ) u_cache (
+            .clk,
+            .rst,
+            .request(mem_valid && in_code && !has_core),
+            .address(mem_addr[$clog2(CODE_BYTES)-1:2]),
+            .ready  (found),
+            .word   (code_word),
+            // flash
+            .cs_n   (flash_cs_n),
+            .sclk   (flash_sclk),
+            .mosi   (flash_mosi),
+            .miso   (flash_miso)
+        );
+    end else begin : g_no_code
+        assign {found, code_word} = '0;
+        assign {flash_cs_n, flash_sclk, flash_mosi} = 3'b100;
+
+        wire unused = &{1'b0, flash_miso};
+    end
 
     core_multiplier u_multiplier (
         .clk,
@@ -231,7 +271,7 @@ module soft_core #(
         if (past && first && mem_valid && !mem_instr && mem_wstrb == '0 && in_memory)
             assume (mem_addr[A-1:2] == $past(pcpi_rs1[A-1:2]));
         if (past && !$past(rst)) begin
-            if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
+            if ($past(mem_valid && !in_memory && !in_registers && !in_code)) assert (trap);
             if ($past(lost)) assert (trap);
             assert (32'(select) + 32'(awaited) + 32'(answered) <= 1);
             assert (select == $past(request && ready));
@@ -243,8 +283,10 @@ module soft_core #(
             if (fresh) assert (read_number == next && !read_old);
             if (held) assert (word_number == next && !word_old);
             if (mem_valid && memory_ready && !storing && !core_trap) begin
-                assert (in_memory && mem_wstrb == '0);
-                assert (word_number == mem_addr[A-1:2] && !word_old);
+                assert ((in_memory || in_code) && mem_wstrb == '0);
+                if (in_memory)
+                    assert (word_number == mem_addr[A-1:2] && !word_old);
+                    else assert ($past(found) && word == $past(code_word));
             end
             cover (mem_valid && has_ahead && mem_instr);
             cover (mem_valid && in_memory && mem_instr);

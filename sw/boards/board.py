@@ -8,6 +8,7 @@ from pathlib import Path
 
 from boards.family import FAMILIES, Part
 from boards.toml_file import ROOT, Misfit, Table, read
+from firmware.build import CODE_BYTES
 
 FOLDER = ROOT / "constraints"
 # what a LED may show; the texts are expressions of the top that is made
@@ -37,6 +38,7 @@ ETHERNET = {
 OF_THE_TOP = ("reference", "reset_n")  # of these, what the top drives and not the Ethernet core
 ETHERNET_HZ = {"mii": 25_000_000, "rgmii": 125_000_000}  # of its clocks
 ETHERNET_FAMILIES = {"mii": ("ecp5", "xc7"), "rgmii": ("ecp5",)}  # for which LiteEth makes its core
+MOST_FLASH = 1 << 24  # bytes that a command of three bytes of address reaches
 MOST_HZ = 1_000_000_000  # of a clock
 MOST_DELAY_NS = 3.1  # of a pin of the ECP5
 PULLS = ("up", "down", "none")
@@ -70,6 +72,14 @@ class Loader:
     def target(self) -> str:
         """The target of make that loads a bitstream."""
         return "load" if self.sram else "flash"
+
+
+@dataclass(frozen=True)
+class Code:
+    """Where the part of a firmware is that a soft core executes from the flash of the board."""
+
+    offset: int  # its byte address, behind the bitstream
+    loader: list[str]  # options of openFPGALoader that choose this flash
 
 
 @dataclass(frozen=True)
@@ -112,6 +122,7 @@ class Board:
     layout: str  # boards of one layout have the same connectors
     sources: list[str]
     loader: Loader
+    code: Code | None  # None: no soft core executes anything from its flash
     part: Part
     clock: Pad
     clock_hz: int
@@ -178,6 +189,20 @@ def loader_of(table: Table) -> Loader:
     )
     table.close()
     return loader
+
+
+def code_of(table: Table) -> Code | None:
+    """The place of [code]; None if there is no such table."""
+    if not table.left:
+        return None
+    code = Code(table.take("offset", int), table.words("loader"))
+    table.close()
+    if code.offset % CODE_BYTES or not 0 < code.offset <= MOST_FLASH - CODE_BYTES:
+        raise table.misfit(
+            f"offset {code.offset} must be a multiple of {CODE_BYTES}, above 0 and below "
+            f"{MOST_FLASH}"
+        )
+    return code
 
 
 def pull_of(table: Table) -> str:
@@ -311,6 +336,7 @@ def load(path: Path) -> Board:
         layout=table.take("layout", str),
         sources=table.words("sources"),
         loader=loader_of(table.table("loader", True)),
+        code=code_of(table.table("code")),
         part=part_of(table.table("part", True)),
         clock=Pad(clock.take("pin", str), "clock", "in"),
         clock_hz=clock.within("hz", 1, MOST_HZ),

@@ -19,8 +19,10 @@ from boards.machine import (
     Wiring,
 )
 from boards.toml_file import Misfit, TooLarge
+from firmware.build import CODE_BYTES
 
 TICK_HZ = 4000  # servo tick that the firmware sets
+LEAST_CODE_HZ = 15_000_000  # clock for firmware in the flash: a round of 73 000 cycles in 5 ms
 SPRAM = "-spram"  # option of the synthesis: large memories are single-port RAMs of an iCE40
 PLACEHOLDER = "placeholder"  # of the firmware; the name of its file
 
@@ -83,13 +85,15 @@ class Design:
 
     @property
     def firmware_address(self) -> int:
-        """Byte address of the firmware in the flash, for a serial core; behind the bitstream."""
+        """Byte address in the flash, behind the bitstream, of the firmware of a serial core, or of
+        what a soft core executes from there.
+        """
         return int(self.parameters["FLASH_START"])
 
 
 def has_placeholder(board: Board, machine: Machine) -> bool:
     placer = board.part.family.placer
-    return machine.core == "soft" and placer is not None and placer.contents is not None
+    return machine.core != "serial" and placer is not None and placer.contents is not None
 
 
 def mask(machine: Machine, name: str) -> int:
@@ -131,7 +135,9 @@ def parameters(board: Board, machine: Machine) -> dict[str, int | str]:
         "HAS_UPDATE": int(machine.update),
         **board.part.node,
     }
-    if machine.core == "soft":
+    if machine.core == "flash" and board.code:
+        found |= {"CODE_BYTES": CODE_BYTES, "FLASH_START": board.code.offset}
+    if machine.core != "serial":
         words = PLACEHOLDER if has_placeholder(board, machine) else size.firmware_stem(machine)
         found["FIRMWARE"] = f"build/boards/{board.name}-{machine.name}/{words}.hex"
     return found
@@ -302,13 +308,23 @@ def check_part(board: Board, machine: Machine, needed: size.Size) -> None:
                 f"has {most}"
             )
     if machine.has_flash:
-        reader = "relay" if machine.orders else "serial core"
+        reader = "relay" if machine.orders else f"node with core {machine.core!r}"
         if missing := [name for name in FLASH if name not in board.on_board]:
             raise Misfit(f"{machine.file}: a {reader} needs {missing[0]}, {board.file} has none")
     if machine.core == "serial" and not part.family.appendable:
         raise Misfit(
             f"{machine.file}: a serial core has its firmware behind the bitstream, which is a text "
             f"for {part.name} of {board.file}"
+        )
+    if machine.core == "flash" and board.code is None:
+        raise Misfit(
+            f"{machine.file}: core 'flash' needs [code] of {board.file}: where in the flash the "
+            "firmware may be"
+        )
+    if machine.core == "flash" and board.node_hz < LEAST_CODE_HZ:
+        raise Misfit(
+            f"{machine.file}: core 'flash' needs a clock of {LEAST_CODE_HZ} Hz at least, but "
+            f"{board.file} has {board.node_hz} Hz"
         )
     cycles = board.node_hz // TICK_HZ
     if (taken := size.tick_cycles(machine)) > cycles:

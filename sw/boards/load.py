@@ -20,6 +20,7 @@ from pathlib import Path
 
 from boards.build import OUT, chosen, note_of
 from boards.fit import Design, fit
+from boards.packing import code_of
 from boards.toml_file import ROOT, Misfit, shown
 
 FOLDER = ROOT / "build" / "loader"
@@ -58,8 +59,14 @@ def bitstream(design: Design) -> Path:
     return made
 
 
+def cable(design: Design) -> list[str]:
+    """The options of the loader that choose board and cable."""
+    loader = design.board.loader
+    return ["-b", loader.board, *(["-c", loader.cable] if loader.cable else [])]
+
+
 def options(design: Design, flash: bool) -> list[str]:
-    """The options of the loader."""
+    """The options of the loader for the bitstream."""
     loader = design.board.loader
     if not flash and not loader.sram:
         raise Misfit(
@@ -67,7 +74,7 @@ def options(design: Design, flash: bool) -> list[str]:
             f"{design.arguments}"
         )
     where = ["-f", "-o", str(loader.flash_offset)] if flash else ["-m"]
-    return ["-b", loader.board, *(["-c", loader.cable] if loader.cable else []), *where]
+    return [*cable(design), *where]
 
 
 def reason(words: str) -> str:
@@ -80,9 +87,20 @@ def reason(words: str) -> str:
 
 
 def load(design: Design, flash: bool, more: Sequence[str] = ()) -> None:
-    """Runs the loader, whose progress goes to the terminal."""
-    made = bitstream(design)
-    command = [*program(), *options(design, flash), *more, str(made)]
+    """Runs the loader for the bitstream, and before it for what a soft core executes from the
+    flash.
+    """
+    made, chosen = bitstream(design), options(design, flash)
+    if code := code_of(design, made.parent):
+        place = design.board.code
+        assert place, "fit() refuses such a machine on a board without [code]"
+        run([*cable(design), *place.loader, "-o", str(place.offset)], more, code)
+    run(chosen, more, made)
+
+
+def run(chosen: Sequence[str], more: Sequence[str], file: Path) -> None:
+    """Runs the loader for a file, whose progress goes to the terminal."""
+    command = [*program(), *chosen, *more, str(file)]
     bridges = FOLDER / "openfpgaloader" / "share" / "openFPGALoader"
     done = subprocess.run(
         command,

@@ -13,7 +13,7 @@ from typing import Any
 
 from boards import front_ends
 from boards.toml_file import ROOT, Misfit, Table, read, shown
-from firmware.build import IMAGES
+from firmware.build import CORES, IMAGES
 from moire import description
 from moire.bus.protocol import MOST_AXES
 from moire.errors import BadFile
@@ -182,7 +182,7 @@ class Machine:
     title: str
     orders: int  # of the relay; 0: the machine is a node
     image: str  # firmware; a relay has none
-    core: str
+    core: str  # soft, serial, or flash: a soft core that executes a part of it from the flash
     memory_kib: int
     update: bool  # of the firmware over the bus, into the flash of a serial core
     address: int  # on the bus, where the board has no switches
@@ -220,7 +220,7 @@ class Machine:
     @property
     def has_flash(self) -> bool:
         """Whether it reads the flash of the board: firmware, or coefficients of a relay."""
-        return self.core == "serial" or self.orders > 0
+        return self.core in ("serial", "flash") or self.orders > 0
 
     def signals(self) -> dict[str, Signal]:
         """{name: signal} of all its signals that are to be connected."""
@@ -419,8 +419,8 @@ def load(path: Path) -> Machine:
     if is_relay and not 1 <= orders <= MOST_ORDERS:
         raise kind.misfit(f"orders {orders} must be 1 to {MOST_ORDERS}")
     core = "" if is_relay else kind.take("core", str, "soft")
-    if core not in ("", "soft", "serial"):
-        raise kind.misfit(f"core {core!r} is none of soft, serial")
+    if core and core not in CORES:
+        raise kind.misfit(f"core {core!r} is none of {', '.join(CORES)}")
     update = not is_relay and kind.take("update", bool, False)
     if update and core != "serial":
         raise kind.misfit("update needs core 'serial': the firmware of the other comes out of RAM")

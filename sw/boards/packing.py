@@ -29,6 +29,13 @@ def program_of(design: Design, folder: Path) -> Path:
     return folder / f"{firmware_stem(design.machine)}.{end}"
 
 
+def code_of(design: Design, folder: Path) -> Path | None:
+    """The file of what a soft core executes from the flash; None if it does not."""
+    if design.machine.core != "flash":
+        return None
+    return folder / f"{firmware_stem(design.machine)}.flash"
+
+
 def with_firmware(design: Design, folder: Path, text: str) -> str:
     """The file of a placed design with the firmware in its block RAMs, if it has it there."""
     contents = design.placer.contents

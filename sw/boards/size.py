@@ -28,6 +28,7 @@ ETHERNET = {"mii": 3377, "rgmii": 4921}  # core of LiteEth by the interface, as 
 SET_POINTS, SET_POINTS_AXIS = 3827, 353  # of the first axis that has them, of each further one
 # Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of the builds)
 MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
+CODE_CACHE = 2  # what it keeps of a flash
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
 SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
@@ -75,6 +76,7 @@ def ecp5_block_ram(machine: Machine) -> int:
         return sum(all(axis.has(name) for name in names) for axis in axes)
 
     found = MEMORY_STEP * -(-machine.memory_kib // MEMORY_STEP_KIB)
+    found += CODE_CACHE * (machine.core == "flash")
     found += next(ram for most, ram in SETTINGS if len(axes) <= most)
     found += RECORDER * count("recorder") + SEGMENT_TABLE * count("segments")
     own = count("harmonics", "own_chain")
@@ -99,7 +101,7 @@ def estimate(family: str, machine: Machine, interface: str = "", spram: bool = F
     if family == "ice40":
         lut = COUNTING_NODE + (len(axes) - 4) * COUNTING_AXIS
         block_ram = ICE40_BLOCK_RAM + ICE40_CAPTURE * sum(axis.has("capture") for axis in axes)
-        if machine.core == "soft":
+        if machine.core != "serial":
             lut += STEP_NODE - 2 * STEP_AXIS
             block_ram += 0 if spram else ICE40_KIB * machine.memory_kib
         return Size(lut, block_ram)

@@ -4,6 +4,8 @@
 //
 //   core_run CYCLES [ADDRESS=VALUE …]
 //
+// With CODE, the name of a file of hexadecimal words, the core has a flash with these words.
+//
 // A read of ADDRESS gives VALUE until it is written; the time stamp counts cycles. Each write to
 // the last register ends a section of the program: core_run prints the number that was written and
 // the cycle. 0 ends the run; a trap or CYCLES cycles without it are a failure.
@@ -11,11 +13,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <memory>
 #include <vector>
 
 #include "Vtop.h"
 #include "firmware/made/registers.h"
+#include "twin/devices/serial_flash.h"
 #include "verilated.h"
 
 namespace {
@@ -35,6 +39,12 @@ int main(int count, char** words) {
     auto top = std::make_unique<Vtop>();
     uint64_t now = 0;
     top->ready = 1;
+#ifdef CODE
+    std::ifstream file(CODE);
+    std::vector<uint32_t> code;
+    for (uint32_t word; file >> std::hex >> word;) code.push_back(word);
+    twin::SerialFlash flash(code);
+#endif
     for (top->rst = 1; now < most && !(now > RESET && top->trap); now++) {
         top->rst = now < RESET;
         top->clk = 0;
@@ -43,6 +53,9 @@ int main(int count, char** words) {
         const uint32_t address = top->address, wdata = top->wdata;
         top->clk = 1;
         top->eval();
+#ifdef CODE
+        top->flash_miso = flash.clk(top->flash_cs_n, top->flash_sclk, top->flash_mosi);
+#endif
         if (!select) continue;
         if (write && address == LAST_REGISTER) {
             if (wdata == 0) return 0;

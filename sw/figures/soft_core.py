@@ -57,6 +57,7 @@ class Core(NamedTuple):
     source: Path  # of the top module of the simulation
     package: str = ""  # whose Verilog the core needs besides ours
     file: str = ""  # of the package
+    in_flash: bool = False  # it executes from a flash what it needs seldom
 
 
 SOFT_CORE = source_of("soft_core")
@@ -65,6 +66,9 @@ IN_ITS_PLACE = HERE / "vexriscv_core.sv"
 CORES = {
     "soft_core, rv32im": Core("generic_rv32+m-a-f-d-c", SOFT_CORE),
     "soft_core, rv32imc": Core("generic_rv32+m-a-f-d+c", SOFT_CORE),
+    "soft_core, rv32imc, in part from a flash": Core(
+        "generic_rv32+m-a-f-d+c", SOFT_CORE, in_flash=True
+    ),
     "VexRiscv_IMAC, rv32imc": Core(
         "generic_rv32+m-a-f-d+c", IN_ITS_PLACE, VEXRISCV, "VexRiscv_IMAC.v"
     ),
@@ -102,8 +106,14 @@ def folder_of(package: str) -> Path:
     return Path(spec.submodule_search_locations[0]) / "verilog"
 
 
-def program(core: Core, folder: Path) -> tuple[Path, int]:
-    """The file of words of core_work.c with the whole firmware, and the bytes of its program."""
+class Program(NamedTuple):
+    words: Path  # of the memory
+    code: Path  # words of the flash
+    size: int  # bytes of both
+
+
+def program(core: Core, folder: Path) -> Program:
+    """core_work.c with the whole firmware."""
     command, libraries = tools.compiler()
     command = [f"-mcpu={core.instructions}" if "-mcpu" in word else word for word in command]
     command += tools.defines_of("axis", 1)
@@ -114,16 +124,24 @@ def program(core: Core, folder: Path) -> tuple[Path, int]:
         other = ["-Dmain=firmware_main"] if path.name == "main.c" else []
         flags = [*tools.FLAGS, *tools.flags_of(path), *other, f"-I{tools.HERE}"]
         tools.run([*command, *flags, "-c", str(path), "-o", str(objects[-1])])
-    script, elf, words = (folder / f"work.{end}" for end in ("ld", "elf", "hex"))
-    script.write_text(f"MEMORY_BYTES = {tools.MEMORY_BYTES};\n" + tools.LINK.read_text())
+    script, elf, words, code = (folder / f"work.{end}" for end in ("ld", "elf", "hex", "code"))
+    script.write_text(
+        tools.link_script(tools.MEMORY_BYTES, tools.seldom(sources) if core.in_flash else [])
+    )
     link = ["-Wl,--gc-sections", f"-Wl,-T,{script}", "-o", str(elf), *libraries]
     tools.run([*command, *tools.FLAGS, *map(str, objects), *link])
-    contents, used = tools.contents(tools.read_elf(elf)[0], tools.MEMORY_BYTES)
-    words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", contents)))
-    return words, used
+    segments, size = tools.read_elf(elf)[0], 0
+    for file, place in (
+        (words, (tools.MEMORY_BYTES, 0)),
+        (code, (tools.CODE_BYTES, tools.CODE_AT)),
+    ):
+        contents, used = tools.contents(segments, *place)
+        file.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", contents)))
+        size += used
+    return Program(words, code, size)
 
 
-def simulated(core: Core, words: Path, folder: Path) -> Path:
+def simulated(core: Core, made_of: Program, folder: Path) -> Path:
     """The Verilated core with core_run.cpp."""
     more = []
     if core.package:
@@ -131,7 +149,11 @@ def simulated(core: Core, words: Path, folder: Path) -> Path:
         waiver.write_text('`verilator_config\nlint_off -file "*/VexRiscv.v"\n')
         more = [waiver, named_by_its_module(folder_of(core.package) / core.file, "VexRiscv")]
     tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
-    values = {"MEMORY_BYTES": tools.MEMORY_BYTES, "FIRMWARE": f'"{words}"'}
+    values: dict[str, int | str] = {
+        "MEMORY_BYTES": tools.MEMORY_BYTES,
+        "FIRMWARE": f'"{made_of.words}"',
+        **({"CODE_BYTES": tools.CODE_BYTES} if core.in_flash else {}),
+    }
     waivers = ROOT / "rtl" / "cpu" / "cores.vlt"
     build.verilate(folder, verilator, core.source, "Vtop", values, waivers, *more)
     headers = verilator / "include"
@@ -139,6 +161,8 @@ def simulated(core: Core, words: Path, folder: Path) -> Path:
     sources = [HERE / "core_run.cpp", *sorted(folder.glob("Vtop*.cpp"))]
     support, made = build.runtime(tool, verilator), folder / "run"
     flags = [*build.compile_flags(), *build.VERILATED, "-DMOIRE_REGISTER_ACCESS", *include]
+    if core.in_flash:
+        flags.append(f'-DCODE="{made_of.code}"')
     build.run([tool, *flags, *sources, support, "-o", made], "g++ of core_run.cpp")
     return made
 
@@ -156,8 +180,8 @@ def work_of(core: Core) -> tuple[int, dict[str, int]]:
     """Bytes of the program, {section of core_work.c: cycles}."""
     with tempfile.TemporaryDirectory(dir=ROOT / "build") as made:
         folder = Path(made)
-        words, size = program(core, folder)
-        return size, cycles_of(simulated(core, words, folder))
+        made_of = program(core, folder)
+        return made_of.size, cycles_of(simulated(core, made_of, folder))
 
 
 def work_line(core: Core) -> str:

@@ -11,6 +11,8 @@ The .hex is for $readmemh: one 32-bit word per line, little endian in memory, fi
 to the size of the memory.
 With --update there is a .update for `moire update`: one line of JSON that says for which nodes it
 is, then the .bin.
+With --core flash the soft core executes the parts that it needs seldom from a serial flash: they
+are in .flash, the others in .bin and .hex, which have the CRC of the .flash.
 The .parts lists how many bytes each source takes. Nothing is built if nothing has changed. The exit
 code is 1, with one line of explanation, if a tool is missing, a source is wrong or the image does
 not fit: then the line says by how many bytes, and which parts are the largest.
@@ -40,6 +42,7 @@ HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "build" / "firmware"
 LINK = HERE / "core" / "link.ld"
 MEMORY_BYTES = 98304  # of the soft core, as node.sv has it
+CODE_AT = 0x20000000  # address of what a soft core executes from its flash
 FLAGS = [
     "-std=c11",
     "-g",
@@ -83,7 +86,19 @@ HOT = (  # files in which speed counts more than size: planning, and answers to 
 CORES = {  # what the compilers may use of a soft core, as zig and as GNU name it
     "soft": ("generic_rv32+m-a-f-d+c", "rv32imc"),
     "serial": ("generic_rv32-m-a-f-d-c", "rv32i"),
+    "flash": ("generic_rv32+m-a-f-d+c", "rv32imc"),  # the soft core, with CODE_BYTES of a node
 }
+IN_FLASH = (  # folders and files that the core `flash` executes from there: not in each round
+    "axis/homing.c",
+    "axis/parameters.c",
+    "bus/scope.c",
+    "bus/segments.c",
+    "calibration",
+    "planner/planner.c",
+    "planner/retarget.c",
+    "station",
+)
+CODE_BYTES = 65536  # of the flash that the core can execute
 ZIG = [
     "-target",
     "riscv32-freestanding-none",
@@ -132,17 +147,20 @@ def read_elf(path: Path) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
     return segments, symbols
 
 
-def contents(segments: list[tuple[int, bytes]], memory: int) -> tuple[bytes, int]:
-    """The contents of a memory of so many bytes, and how many of them are used."""
-    words = bytearray(memory)
-    used = 0
+def contents(segments: list[tuple[int, bytes]], memory: int, begin: int = 0) -> tuple[bytes, int]:
+    """The contents of a memory of so many bytes which begins at an address, the flash being another
+    one than the RAM; and how many of them are used.
+    """
+    words, used = bytearray(memory), 0
     for address, content in segments:
-        if address + len(content) > memory:
-            raise BuildError(
-                f"the firmware needs {address + len(content)} bytes, the memory has {memory}"
-            )
-        words[address : address + len(content)] = content
-        used = max(used, address + len(content))
+        if (address >= CODE_AT) != (begin >= CODE_AT):
+            continue
+        first, end = address - begin, address - begin + len(content)
+        if end > memory:
+            where = "flash" if begin else "memory"
+            raise BuildError(f"the firmware needs {end} bytes, the {where} has {memory}")
+        words[first:end] = content
+        used = max(used, end)
     return bytes(words), used
 
 
@@ -210,7 +228,27 @@ def sources_of(name: str, folder: Path = HERE) -> list[Path]:
     return sources
 
 
-def defines_of(name: str, axes: int | None = None, update: bool = False) -> list[str]:
+def seldom(sources: Iterable[Path]) -> list[str]:
+    """The objects of these sources that the core `flash` executes from there."""
+    return [
+        f"{path.stem}.o"
+        for path in sources
+        if path.is_relative_to(HERE) and path.relative_to(HERE).as_posix().startswith(IN_FLASH)
+    ]
+
+
+def link_script(memory: int, in_flash: Iterable[str] = ()) -> str:
+    """The linker script for a memory of so many bytes; what is in these objects is in the flash."""
+    objects = " ".join(
+        f"*/{name}(.text .text.* .rodata .rodata.* .srodata .srodata.*)" for name in in_flash
+    )
+    code = f".code {CODE_AT:#x} : {{ {objects} . = ALIGN(4); }} :code" if objects else ""
+    return f"MEMORY_BYTES = {memory};\n" + LINK.read_text().replace("/* .code */", code)
+
+
+def defines_of(
+    name: str, axes: int | None = None, update: bool = False, core: str = "soft"
+) -> list[str]:
     """Macros of an image: it serves as many axes as it can, if no number is named. With `update` it
     can write new firmware into the flash of a serial core.
     """
@@ -219,6 +257,7 @@ def defines_of(name: str, axes: int | None = None, update: bool = False) -> list
         f"-DHARDWARE_AXES={axes or image.most_axes}u",
         f"-DHARDWARE_DRIVES={int(image.drives)}",
         f"-DHARDWARE_UPDATE={int(update)}",
+        f"-DHARDWARE_CODE={int(core == 'flash')}",
     ]
 
 
@@ -253,6 +292,14 @@ def update_file(program: bytes, name: str, axes: int, core: str, memory: int) ->
         "crc": zlib.crc32(program),
     }
     return json.dumps(about).encode() + b"\n" + program
+
+
+def with_check(content: bytes, at: int, code: bytes) -> bytes:
+    """The contents of the memory with the number of bytes in the flash and their CRC-32 at an
+    address (core/code.c).
+    """
+    check = struct.pack("<II", len(code), zlib.crc32(code))
+    return content[:at] + check + content[at + len(check) :]
 
 
 def fingerprint(sources: Iterable[Path], command: list[str], memory: int) -> str:
@@ -291,15 +338,15 @@ def build(
     if not 1 <= axes <= image.most_axes:
         raise BuildError(f"the image {name} serves 1 to {image.most_axes} axes, not {axes}")
     command, libraries = compiler(core)
-    command += defines_of(name, axes, update)
+    command += defines_of(name, axes, update, core)
     sources = [*sources_of(name), LINK, HERE / "build.py"]
     stem = stem_of(name, axes, core, update)
     elf, binary, text, parts, note = (
         out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "parts", "note")
     )
     results = [elf, binary, text, parts, note]
-    if update:
-        results.append(out / f"{stem}.update")
+    if update or core == "flash":
+        results.append(out / f"{stem}.{'update' if update else 'flash'}")
     state = fingerprint(sources, command, memory)
     if not force and all(path.exists() for path in results):
         old_state, _, report = note.read_text().partition("\n")
@@ -310,7 +357,8 @@ def build(
 
     inputs = [path for path in sources if path.suffix in (".c", ".S")]
     script = out / f"{stem}.ld"  # zig's linker takes no --defsym
-    script.write_text(f"MEMORY_BYTES = {memory};\n" + LINK.read_text())
+    names = [path.relative_to(HERE).as_posix() for path in inputs]
+    script.write_text(link_script(memory, seldom(inputs) if core == "flash" else []))
     with tempfile.TemporaryDirectory(dir=out) as folder:
         objects = [Path(folder) / f"{path.stem}.o" for path in inputs]
         compiled = [
@@ -333,11 +381,9 @@ def build(
         )
 
         segments, symbols = read_elf(elf)
-        made = {
-            path.relative_to(HERE).as_posix(): path_made
-            for path, path_made in zip(inputs, objects, strict=True)
-        }
-        sizes = sizes_of(elf, made, symbols["_zero_end"])
+        code, in_flash = contents(segments, CODE_BYTES, CODE_AT)
+        made = dict(zip(names, objects, strict=True))
+        sizes = sizes_of(elf, made, symbols["_zero_end"] + in_flash)
 
     used, stack = symbols["_zero_end"], symbols["_stack_top"] - symbols["_stack_limit"]
     free = memory - used - stack
@@ -347,6 +393,9 @@ def build(
             f"large for a memory of {memory} bytes; its largest parts: {largest_parts(sizes)}"
         )
     content, program = contents(segments, memory)
+    if core == "flash":
+        content = with_check(content, symbols["code_check"], code[:in_flash])
+        results[-1].write_bytes(code[:in_flash])
     binary.write_bytes(content[:program])
     if update:
         results[-1].write_bytes(update_file(content[:program], name, axes, core, memory))
@@ -355,6 +404,7 @@ def build(
     report = (
         f"{stem}: {program} bytes program + {used - program} data + {stack} stack"
         f" = {used + stack} of {memory}, {free} free"
+        + (f"; {in_flash} in the flash" if in_flash else "")
     )
     note.write_text(f"{state}\n{report}\n")
     return report
@@ -373,7 +423,10 @@ def main() -> None:
         + ")",
     )
     parser.add_argument(
-        "--core", choices=sorted(CORES), default="soft", help="soft core (default soft)"
+        "--core",
+        choices=sorted(CORES),
+        default="soft",
+        help="soft core (default soft; flash: the soft core with a part of its program in a flash)",
     )
     parser.add_argument(
         "--memory",

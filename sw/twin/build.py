@@ -16,6 +16,7 @@ import fcntl
 import hashlib
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -409,19 +410,26 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
     return made_once(ROOT / "build" / "simulation" / f"{driver.stem}-{name}", "run", make)
 
 
+def node_values(
+    clk_hz: int, axes: int, file: str, node: Mapping[str, int | str]
+) -> dict[str, int | str]:
+    """The parameters of rtl/node.sv, the usual ones unless `node` has others."""
+    usual: dict[str, int | str] = {
+        "CLK_HZ": clk_hz,
+        "AXES": axes,
+        "MEMORY_BYTES": MEMORY_BYTES,
+        "FIRMWARE": file,
+    }
+    return usual | dict(node)
+
+
 def verilate_node(
     folder: Path, verilator: Path, clk_hz: int, axes: int, node: Mapping[str, int | str]
 ) -> None:
     """C++ of a node, and the header that names its memory. Random crossings read a pin more than
     once, which sw/twin/rising_edge.py does not handle: Verilator evaluates such a node itself.
     """
-    values = {
-        "CLK_HZ": clk_hz,
-        "AXES": axes,
-        "MEMORY_BYTES": MEMORY_BYTES,
-        "FIRMWARE": '""',
-        **node,
-    }
+    values = node_values(clk_hz, axes, '""', node)
     verilate(
         folder,
         verilator,
@@ -452,14 +460,29 @@ def verilate_node(
         raise BuildError(
             f"Verilator's code is not as sw/twin/rising_edge.py expects: {error}"
         ) from error
-    includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
     (folder / "verilated_node.h").write_text(
-        "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
-        "#include <cstring>\n"
-        f"{includes}"
-        f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
-        f"constexpr bool SERIAL_CORE = {'true' if values.get('HAS_SERIAL_CORE') else 'false'};\n"
+        f"{head_of_node(folder, values)}#include <cstring>\n"
         f"#define NODE_MEMORY {words[0]}\n{evaluation}"
+    )
+
+
+def head_of_node(folder: Path, values: Mapping[str, int | str]) -> str:
+    """The first lines of the header of a Verilated node: its sources, and its parameters that the
+    twin must know.
+    """
+    includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
+    numbers = {
+        "CLK_HZ": int(values["CLK_HZ"]),
+        "AXES": int(values["AXES"]),
+        "MEMORY_WORDS": int(values["MEMORY_BYTES"]) // 4,
+        "CODE_WORDS": int(values.get("CODE_BYTES", 0)) // 4,
+    }
+    constants = ", ".join(f"{name} = {number}" for name, number in numbers.items())
+    serial = "true" if values.get("HAS_SERIAL_CORE") else "false"
+    return (
+        "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
+        f"{includes}"
+        f"constexpr int {constants};\nconstexpr bool SERIAL_CORE = {serial};\n"
     )
 
 
@@ -472,13 +495,8 @@ def netlist_of_node(
     image = BUILD / f"{digest([], list(words))}.hex"
     BUILD.mkdir(parents=True, exist_ok=True)
     image.write_text("".join(f"{word:08x}\n" for word in words))
-    values: dict[str, int | str] = {
-        "CLK_HZ": clk_hz,
-        "AXES": axes,
-        "MEMORY_BYTES": MEMORY_BYTES,
-        "FIRMWARE": "" if node.get("HAS_SERIAL_CORE") else str(image.relative_to(ROOT)),
-        **node,
-    }
+    file = "" if node.get("HAS_SERIAL_CORE") else str(image.relative_to(ROOT))
+    values = node_values(clk_hz, axes, file, node)
     return netlist.sources(chosen, ROOT / "rtl" / "node.sv", values, rtl_path())
 
 
@@ -500,14 +518,8 @@ def verilate_netlist(
         "verilator of the netlist of the node",
         environment={**os.environ, "VERILATOR_ROOT": str(verilator)},
     )
-    includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
-    (folder / "verilated_node.h").write_text(
-        "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
-        f"{includes}"
-        f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
-        f"constexpr bool SERIAL_CORE = {'true' if node.get('HAS_SERIAL_CORE') else 'false'};\n"
-        f"{BOTH_LEVELS}"
-    )
+    head = head_of_node(folder, node_values(clk_hz, axes, "", node))
+    (folder / "verilated_node.h").write_text(f"{head}{BOTH_LEVELS}")
 
 
 def twin_library(
@@ -593,10 +605,15 @@ def twin_library(
 
 
 def firmware(
-    image: str = "axis", axes: int | None = None, core: str = "soft", update: bool = False
+    image: str = "axis",
+    axes: int | None = None,
+    core: str = "soft",
+    update: bool = False,
+    memory: int = MEMORY_BYTES,
 ) -> list[int]:
     """The words of an image of the firmware for nodes of so many axes, or of as many as is usual,
-    with this soft core, with or without updates over the bus; built first when it is not fresh.
+    with this soft core and memory, with or without updates over the bus; built first when it is not
+    fresh. With the core `flash`, the words of the flash follow those of the whole memory.
     """
     axes = firmware_build.IMAGES[image].usual_axes if axes is None else axes
     BUILD.mkdir(parents=True, exist_ok=True)
@@ -605,12 +622,18 @@ def firmware(
         run(
             [
                 *[sys.executable, "-m", "firmware.build", "--image", image, "--axes", axes],
-                *["--memory", MEMORY_BYTES, "--core", core, *(["--update"] if update else [])],
+                *["--memory", memory, "--core", core, *(["--update"] if update else [])],
             ],
             "the firmware's build",
         )
         stem = firmware_build.stem_of(image, axes, core, update)
-        return words_of(ROOT / "build" / "firmware" / f"{stem}.hex")
+        made = ROOT / "build" / "firmware" / f"{stem}.hex"
+        words = words_of(made)
+        if core == "flash":
+            code = made.with_suffix(".flash").read_bytes()
+            words += [0] * (memory // 4 - len(words))
+            words += [word for (word,) in struct.iter_unpack("<I", code)]
+        return words
 
 
 def words_of(file: Path) -> list[int]:

@@ -51,7 +51,7 @@ ACCESSES = f"{CORE}mem_valid & {CORE}mem_addr >> 31"  # a register; it may wait 
 WAITS = f"vlSelfRef.node__DOT__core_waits & {ACCESSES}"
 ENGINE_RESTS = "node__DOT__u_motion__DOT__g_engine__DOT__u_engine__DOT__quiet"
 ALWAYS = "1U"
-SERIAL_CORE = "node__DOT__g_serial_core__DOT__"  # its nodes rest never
+FLASH = ("node__DOT__g_serial_core__DOT__", f"{CORE[10:]}g_code__DOT__")  # such a node rests never
 # What may change while the soft core accesses no register: counters in any case; the core itself,
 # and with it what receives and sends the bits of a bus, which has nothing to do most of the time;
 # the motion engine until there is nothing to do for it; the axes while they move, and for some
@@ -564,8 +564,8 @@ def function(design: Design) -> str:
     program = [*logic, *flip_flops]
     if late := effect_of(program).needs & design.of_inputs:
         raise FormError(f"logic of inputs stays behind: {', '.join(sorted(late))}")
-    serial = any(name.startswith(SERIAL_CORE) for name in design.types)
-    waits, accesses = (NEVER, ALWAYS) if serial else (WAITS, ACCESSES)
+    has_flash = any(name.startswith(FLASH) for name in design.types)
+    waits, accesses = (NEVER, ALWAYS) if has_flash else (WAITS, ACCESSES)
     if missing := set(re.findall(r"node__\w+", waits)) - set(design.types):
         raise FormError(f"there is no {', '.join(sorted(missing))}")
     edges = Edges(design, program, len(logic), tree_of(design))

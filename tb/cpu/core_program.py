@@ -38,19 +38,23 @@ def memory_results(a, b):
     ]
 
 
-def content(core, memory_bytes, loaded_bytes):
-    """Compile tb/cpu/`core`_test.c with the firmware's own tools; the bytes to load."""
+def content(core, memory_bytes, loaded_bytes, code_bytes=0):
+    """Compile tb/cpu/`core`_test.c with the firmware's own tools; the bytes to load into the
+    memory, and `code_bytes` for the flash, which has the program without its start if it is not 0.
+    """
     here, (command, libraries) = Path(__file__).parent, firmware_build.compiler(core)
     build = ROOT / "build" / f"{core}_core"
     build.mkdir(parents=True, exist_ok=True)
-    elf = build / "program.elf"
+    elf, script = build / "program.elf", build / "program.ld"
+    code_at = firmware_build.CODE_AT if code_bytes else 0
+    script.write_text(f"CODE = {code_at:#x};\n" + (here / "core_program.ld").read_text())
     subprocess.run(
         [
             *command,
             *firmware_build.FLAGS,
             firmware_build.FAST,
             f"-DMEMORY_BYTES={memory_bytes}",
-            f"-Wl,-T,{here / 'core_program.ld'}",
+            f"-Wl,-T,{script}",
             "-o",
             str(elf),
             str(here / f"{core}_test.c"),
@@ -59,7 +63,9 @@ def content(core, memory_bytes, loaded_bytes):
         check=True,
         timeout=300,
     )
-    return firmware_build.contents(firmware_build.read_elf(elf)[0], loaded_bytes)[0]
+    segments = firmware_build.read_elf(elf)[0]
+    code = firmware_build.contents(segments, code_bytes, firmware_build.CODE_AT)[0]
+    return firmware_build.contents(segments, loaded_bytes)[0], code
 
 
 class Registers:

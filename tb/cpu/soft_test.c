@@ -4,6 +4,8 @@
  * access to them, and writes the results to the registers, one after the other. Then it executes
  * the wrong access that the register ORDER selects; all orders above 0 must trap.
  */
+#define CODE 0x20000000u /* the flash; it has CODE_BYTES at most */
+#define CODE_BYTES 8192u
 #include "core_program.h"
 
 /* Compressed instructions: `code` computes a0 from a0 (operand a) and a1 (operand b). It may change
@@ -23,7 +25,7 @@ __asm__(
     "_start:\n"
     "    lui t0, 0x80000\n"
     "    sw sp, 12(t0)\n"
-    "    j main\n");
+    "    tail main\n");
 
 u32 starts = 0x1000; /* a reset does not clear the memory */
 
@@ -85,6 +87,8 @@ void main(void) {
         case 11: ((void (*)(void))REGISTERS)(); break;
         case 12: ((void (*)(void))0x40000000)(); break;
         case 13: __asm__ volatile("c.ebreak"); break;
+        case 14: *(volatile u32*)CODE = 1; break;
+        case 15: RESULT = *(volatile u32*)(CODE + CODE_BYTES); break;
         default: access_wrongly(order); break;
         }
     }

@@ -170,7 +170,7 @@ async def another_image_starts_and_one_on_trial_is_replaced_by_image_0_in_time(d
 
 @pytest.mark.parametrize("update", [0, 1])
 def test_serial_core(update):
-    content = core_program.content("serial", BYTES, PROGRAM)
+    content = core_program.content("serial", BYTES, PROGRAM)[0]
     FLASH.write_bytes(content)
     parameters = {"MEMORY_BYTES": BYTES, "PROGRAM_BYTES": PROGRAM, "FLASH_START": START}
     run("serial_core", __file__, HAS_UPDATE=update, **parameters)

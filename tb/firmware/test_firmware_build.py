@@ -6,6 +6,7 @@ import re
 import struct
 import subprocess
 import sys
+import zlib
 
 import pytest
 
@@ -169,3 +170,34 @@ def test_two_sources_of_the_same_stem_are_refused(tmp_path):
         firmware_build.sources_of("axis", tmp_path)
     (tmp_path / "axis" / "clock.c").unlink()
     assert len(firmware_build.sources_of("axis", tmp_path)) == 2
+
+
+def test_the_core_flash_has_what_is_needed_seldom_in_a_file_of_its_own_with_its_crc(tmp_path):
+    memory = 32768
+    run = build(tmp_path, "--core", "flash", "--memory", str(memory))
+    assert run.returncode == 0, run.stderr
+    code = (tmp_path / "firmware_flash.flash").read_bytes()
+    assert f"{len(code)} in the flash" in run.stdout
+    _, symbols = firmware_build.read_elf(tmp_path / "firmware_flash.elf")
+    in_flash = {name for name, value in symbols.items() if value >= firmware_build.CODE_AT}
+    assert in_flash > {"homing_begin", "planner_move", "planner_retarget", "parameters_set"}
+    assert not {"main", "bus_poll", "axis_poll", "code_intact"} & in_flash
+    words = [int(line, 16) for line in (tmp_path / "firmware_flash.hex").read_text().split()]
+    at = symbols["code_check"] // 4
+    assert len(words) == memory // 4
+    assert words[at : at + 2] == [len(code), zlib.crc32(code)]
+
+
+def test_firmware_beyond_what_the_core_executes_of_the_flash_is_refused():
+    segments = [(0, bytes(8)), (firmware_build.CODE_AT, bytes(firmware_build.CODE_BYTES + 4))]
+    with pytest.raises(firmware_build.BuildError) as why:
+        firmware_build.contents(segments, firmware_build.CODE_BYTES, firmware_build.CODE_AT)
+    assert str(why.value) == "the firmware needs 65540 bytes, the flash has 65536"
+    assert firmware_build.contents(segments, 16) == (bytes(16), 8)
+
+
+def test_a_node_executes_as_much_of_the_flash_as_the_firmware_may_have():
+    core = (ROOT / "rtl" / "cpu" / "soft_core.sv").read_text(encoding="utf-8")
+    assert f"mem_addr[31:28] == 4'h{firmware_build.CODE_AT >> 28:x}" in core
+    code = (FIRMWARE / "core" / "code.c").read_text(encoding="utf-8")
+    assert f"{firmware_build.CODE_AT:#x}u" in code

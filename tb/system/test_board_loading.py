@@ -93,6 +93,28 @@ def test_further_options_of_the_loader_come_after_ours(loader, tmp_path):
     assert record.read_text().split("\n") == words
 
 
+@pytest.mark.parametrize("flash", [False, True])
+def test_what_is_executed_from_the_flash_is_written_there_before_the_bitstream(
+    flash, loader, tmp_path, monkeypatch
+):
+    loader()
+    one, written = design("tang_nano_20k", "s0_flash"), []
+    file = made(one, tmp_path)
+    monkeypatch.setattr(load, "run", lambda *words: written.append(words))
+    load.load(one, flash, ["-v"])
+    board_words = ["-b", "tangnano20k"]
+    where = ["-f", "-o", "0"] if flash else ["-m"]
+    assert written == [
+        (
+            [*board_words, "--external-flash", "-o", str(0x70_0000)],
+            ["-v"],
+            file.parent / "firmware_flash.flash",
+        ),
+        ([*board_words, *where], ["-v"], file),
+    ]
+    assert one.parameters["FLASH_START"] == 0x70_0000
+
+
 def test_the_offset_of_the_flash_is_that_of_the_board_file(loader, tmp_path):
     change = ('board = "ulx3s"\n', 'board = "ulx3s"\nflash_offset = 0x20_0000\n')
     path = edited(tmp_path, ULX3S, change)
@@ -339,9 +361,9 @@ def test_contents_that_are_not_found_whole_are_refused():
 
 def test_only_a_soft_core_of_a_part_that_is_placed_has_a_placeholder():
     names = [("colorlight_i5", "mill"), ("tang_nano_20k", "mill"), ("icebreaker", "counter_box")]
-    names += [("icebreaker", "relay"), ("arty_a7_35t", "mill")]
+    names += [("icebreaker", "relay"), ("tang_nano_20k", "s0_flash"), ("arty_a7_35t", "mill")]
     designs = [design(*each) for each in names]
-    assert [one.in_block_ram for one in designs] == [True, True, False, False, False]
+    assert [one.in_block_ram for one in designs] == [True, True, False, False, True, False]
     assert designs[0].parameters["FIRMWARE"].endswith("colorlight_i5-mill/placeholder.hex")
     assert designs[-1].parameters["FIRMWARE"].endswith("arty_a7_35t-mill/steps_3_axes.hex")
 

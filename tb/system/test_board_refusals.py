@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from boards import board, build, machine, size
+from boards import board, build, clocks, machine, size
 from boards.fit import fit
 from boards.toml_file import Misfit
 from tb.bench import ROOT
@@ -204,6 +204,56 @@ def test_a_serial_core_on_a_part_whose_bitstream_is_a_text_is_refused(tmp_path):
     assert refusal(lambda: fit(board.named("tang_nano_20k"), machine.load(path))) == (
         f"{path}: a serial core has its firmware behind the bitstream, which is a text for "
         f"GW2AR-18C of {tang}"
+    )
+
+
+TANG = "constraints/tang_nano_20k/board.toml"
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        (
+            'flash_cs_n = "60"\n',
+            "",
+            "a node with core 'flash' needs flash_cs_n, {path} has none",
+        ),
+        (
+            "[code] # in the flash of the configuration, which has 8 MiB\noffset = 0x70_0000\n"
+            'loader = ["--external-flash"]\n',
+            "",
+            "core 'flash' needs [code] of {path}: where in the flash the firmware may be",
+        ),
+        (
+            "node_hz = 27_000_000",
+            "node_hz = 13_500_000",
+            "core 'flash' needs a clock of 15000000 Hz at least, but {path} has 13500000 Hz",
+        ),
+    ],
+)
+def test_a_board_that_cannot_execute_from_its_flash_is_refused(
+    old, new, words, tmp_path, monkeypatch
+):
+    path, flashed = edited(tmp_path, TANG, (old, new)), machine.named("s0_flash")
+    monkeypatch.setattr(clocks, "pll", lambda *_: None)
+    found = refusal(lambda: fit(board.load(path), flashed))
+    assert found == f"{flashed.file}: {words.format(path=path)}"
+
+
+@pytest.mark.parametrize("offset", [0, 0x70_0001, 0x100_0000])
+def test_code_that_no_command_reaches_in_the_flash_is_refused(offset, tmp_path):
+    path = edited(tmp_path, TANG, ("offset = 0x70_0000", f"offset = {offset}"))
+    assert refusal(lambda: board.load(path)) == (
+        f"{path}: [code] offset {offset} must be a multiple of 65536, above 0 and below 16777216"
+    )
+
+
+def test_an_unknown_core_is_refused(tmp_path):
+    path = edited(
+        tmp_path, "constraints/machines/s0_flash.toml", ('core = "flash"', 'core = "rom"')
+    )
+    assert refusal(lambda: machine.load(path)) == (
+        f"{path}: [node] core 'rom' is none of soft, serial, flash"
     )
 
 

@@ -27,7 +27,7 @@ def program(tmp_path_factory):
     folder, memory = tmp_path_factory.mktemp("program"), 4 * 4096
     command, libraries = firmware_build.compiler()
     script, elf = folder / "link.ld", folder / "bridge.elf"
-    script.write_text(f"MEMORY_BYTES = {memory};\n" + firmware_build.LINK.read_text())
+    script.write_text(firmware_build.link_script(memory))
     sources = [
         Path(__file__).with_name("peripherals_bridge.c"),
         firmware_build.HERE / "core" / "start.S",

@@ -36,6 +36,7 @@ PARAMETERS = {
     "HAS_SET_POINTS": 3,
     "HAS_BACKLASH": 3,
     "MEMORY_BYTES": 4096,
+    "CODE_BYTES": 8192,
     "FIRMWARE": '""',
 }
 TOP = "node"

@@ -22,6 +22,11 @@
 #define HARDWARE_UPDATE 0  // 1: for nodes with HAS_UPDATE, whose firmware reaches its flash
 #endif
 
+#ifndef HARDWARE_CODE
+#define HARDWARE_CODE \
+    0  // 1: a part of the firmware is executed from a flash (CODE_BYTES of a node)
+#endif
+
 // A position of 48 bits.
 static inline int64_t axis_read_position(unsigned axis, uint32_t offset) {
     return (int64_t)(axis_read_wide(axis, offset) << 16) >> 16;

@@ -4,6 +4,7 @@
 // rounds, until a word of the bus is received or the time is over.
 #include "axis/axis.h"
 #include "core/clock.h"
+#include "core/code.h"
 #include "core/hardware.h"
 #include "core/image.h"
 #include "bus/bus.h"
@@ -56,6 +57,7 @@ uint32_t firmware_idle_ticks(void) {
 }
 
 int main(void) {
+    if (!code_intact()) hardware_halt();
     firmware_start();
     const uint32_t tick_cycles = node_read(NODE_CLK_HZ) / PLANNER_TICK_HZ;
     while (hardware_stack_intact()) {

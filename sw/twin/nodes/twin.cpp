@@ -22,6 +22,7 @@
 namespace twin {
 
 constexpr int RESET_CLK = 16;
+constexpr bool HAS_FLASH = SERIAL_CORE || CODE_WORDS > 0;
 constexpr uint32_t ALL_AXES = (1u << AXES) - 1;
 static_assert(AXES <= DrivePins::MOST_AXES);
 
@@ -59,9 +60,11 @@ class Core {  // a Verilated node and its clock
         set_peripheral_pins(pins, PERIPHERAL_SENSE_IDLE);
         pins.rst = 1;
         model_->eval();
-        if (SERIAL_CORE) flash_.emplace(firmware);
+        const auto in_memory = SERIAL_CORE ? 0 : std::min<size_t>(firmware.size(), MEMORY_WORDS);
+        const auto behind = firmware.begin() + std::ptrdiff_t(in_memory);
+        if (HAS_FLASH) flash_.emplace(Firmware(behind, firmware.end()));
 #ifdef NODE_MEMORY  // a netlist has its firmware since synthesis
-        if (!SERIAL_CORE) std::copy(firmware.begin(), firmware.end(), &pins.NODE_MEMORY[0]);
+        std::copy(firmware.begin(), behind, &pins.NODE_MEMORY[0]);
 #endif
         for (int n = 0; n < RESET_CLK; n++)
             for (const int level : {1, 0}) {
@@ -81,7 +84,7 @@ class Core {  // a Verilated node and its clock
     }
     void clk() {  // not in reset
         rising_edge(pins, rest_);
-        if (SERIAL_CORE)
+        if (HAS_FLASH)
             pins.flash_miso = flash_->clk(pins.flash_cs_n, pins.flash_sclk, pins.flash_mosi);
     }
     // Flips a bit of a register; false if it is logic after all, which has its level again.
@@ -338,7 +341,7 @@ Firmware image(const uint32_t* words, int count) { return {words, words + count}
 extern "C" {
 
 int twin_axes() { return AXES; }
-int twin_memory_words() { return MEMORY_WORDS; }
+int twin_memory_words() { return MEMORY_WORDS + CODE_WORDS; }
 void* twin_new(uint64_t seed, int nodes, const uint8_t* addresses, const uint32_t* firmware,
                int words, const char* const* kinds, const double* const* parameters,
                double bit_clk) {
