@@ -5,7 +5,7 @@ python -m figures.soft_core             bytes of program, cycles of each section
                                         the Verilated core
 python -m figures.soft_core --area      LUT and MHz of each core on an ECP5
 python -m figures.soft_core --options   LUT of PicoRV32 with and without each of its options
-python -m figures.soft_core --sizes     writes the table of images in docs/soft_core.md
+python -m figures.soft_core --sizes     writes the tables of images in docs/soft_core.md
 
 VexRiscv is measured if its package pythondata-cpu-vexriscv is installed. docs/soft_core.md has the
 results.
@@ -34,6 +34,8 @@ HERE = Path(__file__).resolve().parent
 SMALLER_BYTES = 65536
 PAGE = ROOT / "docs" / "soft_core.md"
 BEGIN, END = "<!-- sizes -->", "<!-- /sizes -->"
+BEGIN_FLASH, END_FLASH = "<!-- flash sizes -->", "<!-- /flash sizes -->"
+IN_FLASH = (("axis", 1), ("stream", 1), ("steps", 3), ("station", 2))  # images, axes
 CLK_HZ = 60_000_000
 MOST_CYCLES = 20_000_000
 SECTIONS = ("start", "rounds", "requests", "plans", "pieces", "retarget", "waves")
@@ -247,6 +249,27 @@ def sizes() -> None:
         report = tools.build(tools.MEMORY_BYTES, tools.OUT, False, image, axes)
         rows.append(size_row(image, axes, report))
     PAGE.write_text(made_files.filled(PAGE, BEGIN, END, [*rows, ""]), encoding="utf-8")
+    heads = ("image", "axes", "needs of memory", "with a flash", "in the flash")
+    rows = ["", "| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
+    for image, axes in IN_FLASH:
+        reports = [
+            tools.build(tools.MEMORY_BYTES, tools.OUT, False, image, axes, core)
+            for core in ("soft", "flash")
+        ]
+        rows.append(flash_row(image, axes, *reports))
+    text = made_files.filled(PAGE, BEGIN_FLASH, END_FLASH, [*rows, ""])
+    PAGE.write_text(text, encoding="utf-8")
+
+
+def flash_row(image: str, axes: int, whole: str, parted: str) -> str:
+    """The row of an image in docs/soft_core.md, from the reports of its build for the memory alone,
+    and of the one that is in part in the flash.
+    """
+    needed = [re.search(r"= (\d+) of", report) for report in (whole, parted)]
+    in_flash = re.search(r"(\d+) in the flash", parted)
+    numbers = [int(found[1]) for found in (*needed, in_flash) if found]
+    assert len(numbers) == 3
+    return "| " + " | ".join((f"`{image}`", str(axes), *map(spaced, numbers))) + " |"
 
 
 def firmware_free_pct() -> float:
@@ -275,7 +298,7 @@ def main() -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--area", action="store_true", help="LUT and MHz instead of cycles")
     what.add_argument("--options", action="store_true", help="LUT of the options of PicoRV32")
-    what.add_argument("--sizes", action="store_true", help="write the table of images")
+    what.add_argument("--sizes", action="store_true", help="write the tables of images")
     chosen = parser.parse_args()
     if chosen.sizes:
         sizes()

@@ -172,12 +172,13 @@ def test_two_sources_of_the_same_stem_are_refused(tmp_path):
     assert len(firmware_build.sources_of("axis", tmp_path)) == 2
 
 
-def test_the_core_flash_has_what_is_needed_seldom_in_a_file_of_its_own_with_its_crc(tmp_path):
+def test_the_core_flash_has_what_is_needed_seldom_in_a_file_of_its_own(made, tmp_path):
     memory = 32768
     run = build(tmp_path, "--core", "flash", "--memory", str(memory))
     assert run.returncode == 0, run.stderr
     code = (tmp_path / "firmware_flash.flash").read_bytes()
     assert f"{len(code)} in the flash" in run.stdout
+    assert soft_core.flash_row("axis", 1, made[1], run.stdout) in PAGE
     _, symbols = firmware_build.read_elf(tmp_path / "firmware_flash.elf")
     in_flash = {name for name, value in symbols.items() if value >= firmware_build.CODE_AT}
     assert in_flash > {"homing_begin", "planner_move", "planner_retarget", "parameters_set"}
