@@ -28,7 +28,7 @@ ETHERNET = {"mii": 3377, "rgmii": 4921}  # core of LiteEth by the interface, as 
 SET_POINTS, SET_POINTS_AXIS = 3827, 353  # of the first axis that has them, of each further one
 # Block RAMs of an ECP5, as Yosys maps the memories (counted in netlists of the builds)
 MEMORY_STEP_KIB, MEMORY_STEP = 32, 16  # memory of the soft core
-CODE_CACHE = 2  # what it keeps of a flash
+CODE_CACHE, CODE_LUT = 2, 370  # what it keeps of a flash; LUT4 to execute from there
 MICROCODE, ENGINE, ENGINE_AXES = 2, 2, 4  # motion engine; its words for so many axes
 SETTINGS = ((1, 1), (4, 2), (8, 4))  # register_memory of at most so many axes
 RECORDER, SEGMENT_TABLE, HARMONICS_AXES = 2, 1, 2  # of an axis; two axes of a chain share tables
@@ -112,7 +112,7 @@ def estimate(family: str, machine: Machine, interface: str = "", spram: bool = F
         block_ram = -(-block_ram // 2)
     shared += PERIPHERALS * any(name not in LINKS for name in machine.peripherals)
     linked = any(name in LINKS for name in machine.peripherals) or bool(machine.ip_address)
-    shared += LINK * linked
+    shared += LINK * linked + CODE_LUT * (machine.core == "flash")
     if machine.ip_address:
         shared += ETHERNET[interface]
     if followers := sum(axis.has("set_points") for axis in axes):

@@ -84,6 +84,7 @@ OF_STEP_AXES: dict[str, Parameters] = {
     "set-points": {"HAS_SET_POINTS": ALL_AXES},
     "compensation of backlash": {"HAS_BACKLASH": ALL_AXES},
     "real-time link": {"HAS_LINK": 1},
+    "execution from a flash": {"CODE_BYTES": firmware_build.CODE_BYTES},
 }
 OF_SINE_AXES: dict[str, Parameters] = {
     **OF_BOTH,

@@ -337,6 +337,8 @@ def build(
     axes = image.usual_axes if axes is None else axes
     if not 1 <= axes <= image.most_axes:
         raise BuildError(f"the image {name} serves 1 to {image.most_axes} axes, not {axes}")
+    if update and core == "flash":
+        raise BuildError("updates over the bus need --core serial")
     command, libraries = compiler(core)
     command += defines_of(name, axes, update, core)
     sources = [*sources_of(name), LINK, HERE / "build.py"]

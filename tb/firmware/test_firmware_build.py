@@ -189,6 +189,11 @@ def test_the_core_flash_has_what_is_needed_seldom_in_a_file_of_its_own(made, tmp
     assert words[at : at + 2] == [len(code), zlib.crc32(code)]
 
 
+def test_an_update_over_the_bus_is_not_built_for_the_core_flash(tmp_path):
+    error = build(tmp_path, "--core", "flash", "--update").stderr
+    assert error == "firmware: updates over the bus need --core serial\n"
+
+
 def test_firmware_beyond_what_the_core_executes_of_the_flash_is_refused():
     segments = [(0, bytes(8)), (firmware_build.CODE_AT, bytes(firmware_build.CODE_BYTES + 4))]
     with pytest.raises(firmware_build.BuildError) as why:
