@@ -66,7 +66,7 @@ module code_cache #(
     logic looked;  // tag and word are those at address
     logic [T:0] tag;  // bit T: the line is kept; others: upper bits of its address
 
-    (* ram_style = "distributed" *) logic [T:0] tags[0:LINES-1];
+    logic [T:0] tags[0:LINES-1];
     logic [31:0] kept[0:8*LINES-1];
 
     wire [L-1:0] line = address[3+:L];
