@@ -505,9 +505,10 @@ def netlist_of_node(
     """
     image = BUILD / f"{digest([], list(words))}.hex"
     BUILD.mkdir(parents=True, exist_ok=True)
-    image.write_text("".join(f"{word:08x}\n" for word in words))
     file = "" if node.get("HAS_SERIAL_CORE") else str(image.relative_to(ROOT))
     values = node_values(clk_hz, axes, file, node)
+    in_memory = words[: int(values["MEMORY_BYTES"]) // 4]  # others are in the flash
+    image.write_text("".join(f"{word:08x}\n" for word in in_memory))
     return netlist.sources(chosen, ROOT / "rtl" / "node.sv", values, rtl_path())
 
 
