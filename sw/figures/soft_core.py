@@ -241,16 +241,21 @@ def size_row(image: str, axes: int, report: str) -> str:
     return "| " + " | ".join((*cells, f"{free:.1f} %", less)) + " |"
 
 
+def head_of(*cells: str) -> list[str]:
+    """The first lines of a table."""
+    return ["", "| " + " | ".join(cells) + " |", "|" + " --- |" * len(cells)]
+
+
 def sizes() -> None:
     """Builds all images and writes their sizes into the page."""
-    heads = ("image", "node", "axes", "program", "data", "stack", "free of 96 KiB", "of 64 KiB")
-    rows = ["", "| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
+    rows = head_of(
+        "image", "node", "axes", "program", "data", "stack", "free of 96 KiB", "of 64 KiB"
+    )
     for image, axes in IMAGES:
         report = tools.build(tools.MEMORY_BYTES, tools.OUT, False, image, axes)
         rows.append(size_row(image, axes, report))
     PAGE.write_text(made_files.filled(PAGE, BEGIN, END, [*rows, ""]), encoding="utf-8")
-    heads = ("image", "axes", "needs of memory", "with a flash", "in the flash")
-    rows = ["", "| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
+    rows = head_of("image", "axes", "needs of memory", "with a flash", "in the flash")
     for image, axes in IN_FLASH:
         reports = [
             tools.build(tools.MEMORY_BYTES, tools.OUT, False, image, axes, core)
