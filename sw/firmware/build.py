@@ -83,10 +83,11 @@ HOT = (  # files in which speed counts more than size: planning, and answers to 
     "planner.c",
     "retarget.c",
 )
+SOFT = ("generic_rv32+m-a-f-d+c", "rv32imc")
 CORES = {  # what the compilers may use of a soft core, as zig and as GNU name it
-    "soft": ("generic_rv32+m-a-f-d+c", "rv32imc"),
+    "soft": SOFT,
     "serial": ("generic_rv32-m-a-f-d-c", "rv32i"),
-    "flash": ("generic_rv32+m-a-f-d+c", "rv32imc"),  # the soft core, with CODE_BYTES of a node
+    "flash": SOFT,  # with CODE_BYTES of a node
 }
 IN_FLASH = (  # folders and files that the core `flash` executes from there: not in each round
     "axis/homing.c",

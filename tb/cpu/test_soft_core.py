@@ -142,9 +142,8 @@ async def latency_is_2_wait_cycles_for_a_word_of_the_flash_that_is_kept_and_580_
         await registers.clk()
         if not int(core.mem_valid.value):
             continue
-        if int(core.mem_ready.value):
-            if kind(core) == "flash":
-                waited.append(cycles)
+        if int(core.mem_ready.value) and kind(core) == "flash":
+            waited.append(cycles)
         cycles = 0 if int(core.mem_ready.value) else cycles + 1
     assert set(waited) == {2, 580} and waited.count(2) > 10 * waited.count(580) > 100
 
@@ -212,8 +211,8 @@ async def every_word_that_the_core_takes_is_the_one_in_the_memory(dut):
             assert int(core.mem_rdata.value) == int(dut.u_memory.memory[word].value), f"cycle {n}"
             taken.add(word)
         if valid and ready and kind(core) == "flash":
-            at = 4 * word - firmware_build.CODE_AT
-            code = FLASH.read_bytes()[at : at + 4]
+            at = 4 * word - firmware_build.CODE_AT + CODE_START
+            code = registers.flash.memory[at : at + 4]
             assert int(core.mem_rdata.value) == int.from_bytes(code, "little"), f"cycle {n}"
             taken.add(word)
     assert len(taken) > 200

@@ -2,10 +2,10 @@
 """The wires between the soft core and the flash from which it executes."""
 
 from firmware.build import CODE_AT
+from tb.cpu.code_cache import WAKE
 
 REGISTERS = 0x80000000  # where the program of the node adds the address of an access
-WAKE = 0xAB000000  # command to the flash, with 24 bits that it ignores
-BITS = 32
+BITS = 32  # of the command, with 24 that the flash ignores
 AWAKE = 64 * 65  # cycles after a reset
 
 
