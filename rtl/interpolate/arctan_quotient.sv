@@ -157,7 +157,8 @@ module arctan_quotient #(
     logic signed [30:0] rise;
     logic [1:0] quarter;
     logic falls, zero;
-    wire [15:0] octant = 16'(({1'b0, base} + 20'(rise >>> 15)) >> 6);
+    wire signed [19:0] risen = 20'(rise >>> 15);
+    wire        [15:0] octant = 16'(({1'b0, base} + risen) >> 6);
 
     always_ff @(posedge clk) begin
         coming <= {coming[LATENCY-2:0], valid};
