@@ -43,10 +43,10 @@ check: fresh lint proofs test quick  ## what every change must pass
 proofs: $(SETUP)
 	@$(MAKE) -j$(JOBS) --output-sync=target promises prove
 
-promises: $(SETUP)  ## what the project promises of its code: units, latencies, imports, tests, types
-	$(call say,promises: columns; units of ports; latencies; imports; tests that can fail; strict types)
+promises: $(SETUP)  ## what the project promises of its code: units, latencies, size casts, imports, tests, types
+	$(call say,promises: columns; units of ports; latencies; size casts; imports; tests that can fail; strict types)
 	@printf '%s\n' $(PROMISES) | xargs -P $(JOBS) -I{} $(PYTHON) -m tools.check_{}
-PROMISES := types imports tests columns ports latency
+PROMISES := types imports tests columns ports latency casts
 
 lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the layout of all code
 	$(call say,lint: verilator -Wall over $(words $(RTL)) modules; ruff; the formatters)

@@ -160,17 +160,23 @@ def parts(source: Path, folders: Sequence[Path]) -> dict[Path, str]:
     return found
 
 
-def digest(chosen: str, source: Path, parameters: Parameters, folders: Sequence[Path]) -> str:
-    """A name for everything that the netlist depends on."""
+def name_of(chosen: str, source: Path, parameters: Parameters, folders: Sequence[Path]) -> str:
+    """A name for what Yosys makes the netlist from, and its version."""
     total = hashlib.sha256(repr((chosen, source.stem, sorted(parameters.items()))).encode())
     total.update(version("pyosys").encode())
-    for path in (*sorted(BODIES.glob("*.v*")), Path(__file__), ROOT / "tools" / "yosys.py"):
-        total.update(path.read_bytes())
     for path, text in sorted(parts(source, folders).items()):
         total.update(path.name.encode() + text.encode())
     for value in parameters.values():
         if isinstance(value, str) and (ROOT / value).is_file():
             total.update((ROOT / value).read_bytes())
+    return total.hexdigest()[:16]
+
+
+def digest(chosen: str, source: Path, parameters: Parameters, folders: Sequence[Path]) -> str:
+    """A name for everything that a simulation of the netlist depends on."""
+    total = hashlib.sha256(name_of(chosen, source, parameters, folders).encode())
+    for path in (*sorted(BODIES.glob("*.v*")), Path(__file__), ROOT / "tools" / "yosys.py"):
+        total.update(path.read_bytes())
     return total.hexdigest()[:16]
 
 

@@ -6,7 +6,7 @@ import ast
 import pytest
 
 from tables import modules
-from tools import check_columns, check_imports, check_latency, check_ports
+from tools import check_casts, check_columns, check_imports, check_latency, check_ports
 
 MODULE = """// SPDX-License-Identifier: Apache-2.0
 // thing -- adds.
@@ -33,7 +33,7 @@ endmodule
 @pytest.fixture
 def module(tmp_path, monkeypatch):
     """A module with bare ports and latencies to be tested, in a project of its own."""
-    for part in (modules, check_columns, check_latency, check_ports):
+    for part in (modules, check_casts, check_columns, check_latency, check_ports):
         monkeypatch.setattr(part, "ROOT", tmp_path)
     path = tmp_path / "rtl" / "block" / "thing.sv"
     (tmp_path / "tb" / "block").mkdir(parents=True)
@@ -66,6 +66,32 @@ def test_a_latency_without_a_test_of_its_name_is_found(module, names, missing):
     test.write_text("".join(f"async def {name}(dut):\n    pass\n" for name in names))
     found = check_latency.problems()
     assert len(found) == len(missing) and all(m in f for m, f in zip(missing, found, strict=True))
+
+
+@pytest.mark.parametrize(
+    "expression, found",
+    [
+        ("(8'(word) + step) >> 1", True),
+        ("{step[0], 8'(word) ^ step}", True),
+        ("8'(word) + step < step", True),
+        ("-(step - 8'(word)) >>> 1", True),
+        ("step[8'(word) + 8'd1]", True),
+        ("8'(word) + step", False),
+        ("flag ? 8'(word) - step : step", False),
+        ("{step[0], 8'(word)}", False),
+        ("8'(word) < step", False),
+        ("(8'(W + 1) + step) >> 1", False),
+        ("(20'(word) + step) >> 1", False),
+    ],
+)
+def test_a_size_cast_that_yosys_reads_otherwise_is_found(module, expression, found):
+    head = MODULE.split("module")[0]
+    ports = "input wire flag, input wire [15:0] word, input wire [7:0] step, output wire [31:0] sum"
+    module.write_text(
+        f"{head}module thing #(parameter int W = 8) ({ports});\n"
+        f"    assign sum = 32'({expression});\nendmodule\n"
+    )
+    assert check_casts.problems() == (["rtl/block/thing.sv:9"] if found else [])
 
 
 def test_a_cycle_is_found_with_its_modules():
@@ -108,6 +134,6 @@ def test_relative_deferred_and_typed_imports_are_distinguished():
     assert {"p.x", "a.b", "late", "late.y"} <= found and "hidden" not in found
 
 
-@pytest.mark.parametrize("check", [check_imports, check_latency, check_ports])
+@pytest.mark.parametrize("check", [check_casts, check_imports, check_latency, check_ports])
 def test_the_project_has_none(check):
     assert check.problems() == []
