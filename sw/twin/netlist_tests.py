@@ -12,7 +12,6 @@ import json
 import os
 import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 
 from twin.netlist import BUILD, FAMILIES, ROOT
 
@@ -28,8 +27,8 @@ HEAD = """\
 Record = Mapping[str, Mapping[str, str]]  # family, test: netlist
 
 
-def read(path: Path = RECORD) -> dict[str, dict[str, str]]:
-    return tomllib.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+def read() -> dict[str, dict[str, str]]:
+    return tomllib.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
 
 
 def text_of(record: Record) -> str:
@@ -58,13 +57,13 @@ def passed(family: str, test: str, name: str) -> None:
         (PASSED / f"{family}-{tag}.json").write_text(json.dumps([family, test, name]))
 
 
-def keep(path: Path = RECORD) -> int:
+def keep() -> int:
     """Writes what has been collected into the record; returns how many it was."""
-    record, files = read(path), sorted(PASSED.glob("*.json"))
+    record, files = read(), sorted(PASSED.glob("*.json"))
     for file in files:
         family, test, name = json.loads(file.read_text())
         record.setdefault(family, {})[test] = name
-    path.write_text(text_of(record), encoding="utf-8")
+    RECORD.write_text(text_of(record), encoding="utf-8")
     for file in files:
         file.unlink()
     return len(files)

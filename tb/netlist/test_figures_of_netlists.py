@@ -5,6 +5,7 @@ import pytest
 
 from figures import netlist as figures_netlist
 from figures.synthesis import SynthesisError
+from twin import netlist_tests
 
 PROBE = """
 import os
@@ -16,17 +17,26 @@ def test_right():
 def test_wrong():
     assert os.environ["PROBE"] != "set"
 
+"""
+SKIPPED = """
+import pytest
+
 def test_left_out():
     pytest.skip("for a reason")
 """
 
 
 def test_failures_are_counted_and_a_run_without_tests_is_an_error(tmp_path):
-    probe = tmp_path / "test_probe.py"
+    probe, skipped = tmp_path / "test_probe.py", tmp_path / "test_skipped.py"
     probe.write_text(PROBE)
-    assert figures_netlist.failed(str(probe), "", {"PROBE": "set"}) == (2, 1)
+    skipped.write_text(SKIPPED)
+    assert figures_netlist.failed(str(tmp_path), {"PROBE": "set"}) == (2, 1)
+    chosen = {netlist_tests.CHOICE: "new"}
+    assert figures_netlist.failed(str(skipped), chosen) == (0, 0), "all may have passed before"
     with pytest.raises(SynthesisError, match="no test of .* ran"):
-        figures_netlist.failed(str(probe), "left_out", {})
+        figures_netlist.failed(str(skipped), {})
+    with pytest.raises(SynthesisError, match="no test of .* ran"):
+        figures_netlist.failed(str(tmp_path), chosen, [str(probe), str(skipped)])
 
 
 def test_two_builds_are_compared_with_the_reference(tmp_path, monkeypatch):
