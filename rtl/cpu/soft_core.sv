@@ -13,11 +13,11 @@
 //           CODE_START on is at 2000_0000, to be executed and read. Any other access, a misaligned
 //           access and an illegal instruction stop the core: trap is high until rst, which starts
 //           the core at address 0 and leaves the memory as it is.
-//           While an access is under way and does not use
-//           the memory, the memory reads the word after the last instruction. Between two accesses
-//           it reads where the core's operand points, which is the address of the next word of data
-//           if the core begins to read one. So every address of the memory comes from a register:
-//           the look-ahead address of the core would reach the block RAMs late.
+//           While an access is under way and does not use the memory, the memory reads the word
+//           after the last instruction. Between two accesses it reads where the core's operand
+//           points, which is the address of the next word of data if the core begins to read one.
+//           So every address of the memory comes from a register: the look-ahead address of the
+//           core would reach the block RAMs late.
 // source    PicoRV32, from the package pythondata_cpu_picorv32; the address of a word of data is
 //           its operand pcpi_rs1 one cycle early
 // model     tb/cpu/soft_core.py, the results of the program tb/cpu/soft_test.c

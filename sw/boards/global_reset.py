@@ -18,10 +18,10 @@ FLIP_FLOP, RESET = "TRELLIS_FF", "LSR"
 BUFFER = "DCCA"
 
 
-def put_on_clock_line(netlist: Path, top_name: str = TOP, loads: int = LOADS) -> None:
+def put_on_clock_line(netlist: Path, loads: int = LOADS) -> None:
     """Changes a netlist of Yosys where a net resets at least so many flip-flops."""
     design = json.loads(netlist.read_text(encoding="utf-8"))
-    top = design["modules"][top_name]
+    top = design["modules"][TOP]
     reset = [
         cell["connections"][RESET]
         for cell in top["cells"].values()
