@@ -30,13 +30,13 @@ def test_failures_are_counted_and_a_run_without_tests_is_an_error(tmp_path):
     probe, skipped = tmp_path / "test_probe.py", tmp_path / "test_skipped.py"
     probe.write_text(PROBE)
     skipped.write_text(SKIPPED)
-    assert figures_netlist.failed(str(tmp_path), {"PROBE": "set"}) == (2, 1)
+    assert figures_netlist.failed([str(tmp_path)], {"PROBE": "set"}) == (2, 1)
     chosen = {netlist_tests.CHOICE: "new"}
-    assert figures_netlist.failed(str(skipped), chosen) == (0, 0), "all may have passed before"
+    assert figures_netlist.failed([str(skipped)], chosen) == (0, 0), "all may have passed before"
     with pytest.raises(SynthesisError, match="no test of .* ran"):
-        figures_netlist.failed(str(skipped), {})
+        figures_netlist.failed([str(skipped)], {})
     with pytest.raises(SynthesisError, match="no test of .* ran"):
-        figures_netlist.failed(str(tmp_path), chosen, [str(probe), str(skipped)])
+        figures_netlist.failed([str(tmp_path)], chosen, [str(probe), str(skipped)])
 
 
 def test_two_builds_are_compared_with_the_reference(tmp_path, monkeypatch):
