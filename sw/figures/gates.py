@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure of the gates: a machine of each family of FPGAs on the netlist of its node, as the board
+"""Figure of the gates: machines of each family of FPGAs on the netlist of their node, as the board
 builds it, in the twin.
 
 The netlist is that of rtl/node.sv with the parameters, the synthesis and the firmware of `make
 board`; only the clock is slower, and the top with PLL and pins is not there. A netlist of S3 homes
-to the index of its scale and moves. The iCE40 boards have no drives: there the counter box captures
-the index of an axis that something else pushes, and shows where it is.
+to the index of its scale and moves, one of S0 does so by sine and cosine. The iCE40 boards have no
+drives: there the counter box captures the index of an axis that something else pushes, and shows
+where it is.
 """
 
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from boards import board as boards
 from boards import build as boards_build
 from boards import machine as machines
 from boards.fit import Design, fit
 from boards.size import firmware_stem
+from experiments import s0_stage
 from experiments.s3_zero import CLK_HZ, COUNT_M, SETTINGS, Motor
 from figures.common import Figure, Quick, console
 from figures.synthesis import SynthesisError, yosys
@@ -23,11 +25,14 @@ from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport, build
 from twin.netlist import NetlistError
+from twin.nodes.twin import CLK_HZ as S0_CLK_HZ
 from twin.nodes.twin import Axis, Node
 
 BY_TWIN = ("CLK_HZ", "AXES", "FIRMWARE")  # parameters of the node that the twin sets itself
 TARGET_MM = 0.5
 NEAR_UM = 2.0  # two counts of the scale
+S0_TARGET_NM = 20_000
+S0_NEAR_NM = 50.0  # a sixteenth of a period of the signals
 BOX_HZ = 5_000_000
 BOX_START_S = 0.3  # until its serial core has read its firmware and listens
 BOX_ANSWER_S = 0.5  # its answers take four times as long as at 20 MHz
@@ -81,6 +86,42 @@ def homes_and_moves(design: Design, seed: int) -> str:
     return f"{error_um:.2f} um beside the target" if abs(error_um) > NEAR_UM else ""
 
 
+class GateStage:
+    """The X axis of S0 with the netlist of its node on a board."""
+
+    def __init__(self, design: Design, seed: int) -> None:
+        self.twin = twin_of(design, [Node(s0_stage.ADDRESSES["X"])], seed, S0_CLK_HZ)
+        port, source = TwinTransport(self.twin), random.Random(seed)
+        self.twin.run_until_ready()
+        bus = Bus(port, random_source=source, poll_s=s0_stage.POLL_S)
+        self.axis = bus.axis(s0_stage.ADDRESSES["X"])
+
+    @property
+    def true_nm(self) -> float:
+        return self.twin.true_position_nm(0)
+
+
+def interpolates(design: Design, seed: int) -> str:
+    """Why an axis on the netlist of its node does not home and move as its sine and cosine say;
+    empty if it does. The true zero is unknown, but for whole periods of the signals.
+    """
+    stage = GateStage(design, seed)
+    axis = stage.axis
+    axis.enable()
+    axis.home()
+    axis.move(nm=S0_TARGET_NM)
+    status = axis.status()
+    away_nm = stage.true_nm - status.position_nm
+    wrong_nm = away_nm - round(away_nm / s0_stage.PERIOD_NM) * s0_stage.PERIOD_NM
+    console.print(f"{design.name}: {status.position_nm:.1f} nm shown, {wrong_nm:.1f} nm wrong")
+    if status.faults or status.encoder_events:
+        return ", ".join((*status.faults, *status.encoder_events))
+    for what, nm in (("shown", wrong_nm), ("reached", status.position_nm - S0_TARGET_NM)):
+        if abs(nm) > S0_NEAR_NM:
+            return f"{nm:.1f} nm wrong in what is {what}"
+    return ""
+
+
 class Box:
     """The counter box of which the first axis is moved by hand."""
 
@@ -131,11 +172,13 @@ def counts_and_captures(design: Design, seed: int) -> str:
     return f"{wrong_um:.2f} um wrong" if abs(wrong_um) > NEAR_UM else ""
 
 
-MACHINES: Mapping[str, tuple[str, str, Callable[[Design, int], str]]] = {
-    "ecp5": ("colorlight_i5", "s3", homes_and_moves),
-    "ice40": ("icebreaker", "counter_box", counts_and_captures),
-    "gowin": ("tang_nano_20k", "s3", homes_and_moves),
-}
+Check = Callable[[Design, int], str]
+MACHINES: Sequence[tuple[str, str, Check]] = (
+    ("colorlight_i5", "s3", homes_and_moves),
+    ("ulx3s_85f", "s0", interpolates),
+    ("icebreaker", "counter_box", counts_and_captures),
+    ("tang_nano_20k", "s3", homes_and_moves),
+)
 
 
 def elaborates(design: Design, _seed: int) -> str:
@@ -146,9 +189,9 @@ def elaborates(design: Design, _seed: int) -> str:
 
 
 def gates_home_move(simulates: bool = True, seed: int = 1) -> float:
-    """Families of which the machine fails; without a simulation, of which the top is not read."""
+    """Machines that fail; without a simulation, those of which the top is not read."""
     failed = 0
-    for family, (board, machine, check) in MACHINES.items():
+    for board, machine, check in MACHINES:
         design = fit(boards.named(board), machines.named(machine))
         try:
             why = (check if simulates else elaborates)(design, seed)
@@ -156,19 +199,20 @@ def gates_home_move(simulates: bool = True, seed: int = 1) -> float:
             why = str(error)
         if why:
             failed += 1
-            console.print(f"{family}: {why}", markup=False, highlight=False)
+            console.print(f"{design.name}: {why}", markup=False, highlight=False)
     return float(failed)
 
 
 FIGURES = {
     "gates_home_move": Figure(
         gates_home_move,
-        "families",
-        "of ECP5, iCE40 and Gowin, those whose machine fails in the twin on the netlist that Yosys "
-        "makes of its node, with the parameters, synthesis options and firmware of its board and a "
-        "slower clock: S3 on Colorlight i5 and on Tang Nano 20K homes to its index and moves; the "
-        "counter box on iCEBreaker, which has no drives, captures the index of an axis that is "
-        "pushed, and shows where it is",
+        "machines",
+        "of four machines for ECP5, iCE40 and Gowin, those that fail in the twin on the netlist "
+        "that Yosys makes of their node, with the parameters, synthesis options and firmware of "
+        "the board and a slower clock: S3 on Colorlight i5 and on Tang Nano 20K homes to its index "
+        "and moves; S0 on ULX3S 85F homes and moves by sine and cosine; the counter box on "
+        "iCEBreaker, which has no drives, captures the index of an axis that is pushed, and shows "
+        "where it is",
         "0",
         Quick({"simulates": False}, "Yosys elaborates the tops; nothing is simulated"),
         0,

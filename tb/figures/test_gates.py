@@ -39,6 +39,31 @@ def test_a_motor_that_does_not_home_or_move_is_found(ended, why, monkeypatch):
     assert gates.homes_and_moves(DESIGN, 1) == why
 
 
+def stage(true_nm, position_nm=20_003.0, **status):
+    """An axis of S0 that ends like this."""
+    shown = SimpleNamespace(
+        **{"position_nm": position_nm, "faults": (), "encoder_events": (), **status}
+    )
+    nothing = lambda **_: None
+    axis = SimpleNamespace(enable=nothing, home=nothing, move=nothing, status=lambda: shown)
+    return SimpleNamespace(axis=axis, true_nm=true_nm)
+
+
+@pytest.mark.parametrize(
+    "ended, why",
+    [
+        ({"true_nm": 20_003.0 - 27 * 800}, ""),
+        ({"true_nm": 20_003.0 - 27 * 800 + 60}, "60.0 nm wrong in what is shown"),
+        ({"position_nm": 19_900.0, "true_nm": 19_900.0}, "-100.0 nm wrong in what is reached"),
+        ({"true_nm": 20_003.0, "faults": ("encoder",)}, "encoder"),
+        ({"true_nm": 20_003.0, "encoder_events": ("overspeed",)}, "overspeed"),
+    ],
+)
+def test_a_stage_that_does_not_interpolate_is_found(ended, why, monkeypatch):
+    monkeypatch.setattr(gates, "GateStage", lambda *_: stage(**ended))
+    assert gates.interpolates(DESIGN, 1) == why
+
+
 def box(shown_um=470, sources=("index",), events=()):
     """A counter box whose mover is at 470 um, and its index at 0."""
     captured = [SimpleNamespace(sources=sources, position_nm=1000)] if sources else []
@@ -78,21 +103,18 @@ def unread(*_):
     raise SynthesisError("not read")
 
 
-def test_families_that_fail_are_counted(monkeypatch):
-    def machines(*checks):
-        names = [rest[:2] for rest in gates.MACHINES.values()]
-        rows = [(*name, check) for name, check in zip(names, checks, strict=True)]
-        monkeypatch.setattr(gates, "MACHINES", dict(zip("abc", rows, strict=True)))
-
+def test_machines_that_fail_are_counted(monkeypatch):
     good, bad = (lambda *_: ""), (lambda *_: "it does not move")
     whole = gates.MACHINES
-    machines(good, bad, unread)
+    checks = (good, bad, good, unread)
+    rows = [(*names, check) for (*names, _), check in zip(whole, checks, strict=True)]
+    monkeypatch.setattr(gates, "MACHINES", rows)
     assert gates.gates_home_move() == 2
     monkeypatch.setattr(gates, "MACHINES", whole)
     monkeypatch.setattr(gates, "yosys", lambda *_: None)
     assert gates.gates_home_move(simulates=False) == 0
     monkeypatch.setattr(gates, "yosys", unread)
-    assert gates.gates_home_move(simulates=False) == 3
+    assert gates.gates_home_move(simulates=False) == len(whole)
 
 
 def test_the_share_of_the_mill_is_that_of_the_report_after_packing(monkeypatch):
