@@ -100,10 +100,10 @@ def test_needs_skips_with_its_reason():
 @pytest.mark.parametrize(
     "counts, found",
     [
-        ('tests="3" skipped="1" failures="0" errors="0"', (2, 0)),
-        ('tests="3" skipped="3" failures="0"', (0, 0)),
-        ('tests="3" skipped="0" failures="1" errors="1"', (3, 2)),
-        ("", (0, 0)),
+        ('tests="3" skipped="1" failures="0" errors="0"', (2, 1, 0)),
+        ('tests="3" skipped="3" failures="0"', (0, 3, 0)),
+        ('tests="3" skipped="0" failures="1" errors="1"', (3, 0, 2)),
+        ("", (0, 0, 0)),
     ],
 )
 def test_what_was_skipped_did_not_run(tmp_path, counts, found):
