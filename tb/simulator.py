@@ -83,6 +83,7 @@ def run(top, test, seed, parameters):
     name = os.environ.get("PYTEST_CURRENT_TEST", "run").split("::")[-1].split(" ")[0]
     values = {k: as_sv_literal(v) for k, v in parameters.items()}
     tag = "-".join([top, *(f"{k}{v}" for k, v in values.items()), *(["waves"] if waves else [])])
+    tag = tag.replace(f"{ROOT}/", "")
     if not re.fullmatch(r"[\w.-]{1,100}", tag):
         tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
     family = os.environ.get("NETLIST")

@@ -31,6 +31,8 @@ BUILD = ROOT / "build" / "netlist"
 FAMILIES = ("ecp5", "ice40")  # for which the tests of all blocks run
 # of a node: on its netlist, and from random states
 NODE_TESTS = ("tb/twin/test_twin.py", "tb/system/test_s0_stage.py")
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+INSTANCE = re.compile(r"\b(\w+)\s+(?:#\s*\(|\w+\s*\()")  # the module of one, and other words
 SUFFIX = "_netlist"  # of the module that Yosys has made, below its wrapper
 TIMING = re.compile(r"^[ \t]*specify\b.*?^[ \t]*endspecify\b", re.MULTILINE | re.DOTALL)
 OURS = {"DP16KD": "dp16kd.vh", "MULT18X18D": "mult18x18d.vh"}
@@ -148,22 +150,22 @@ def literal(value: int | str) -> str:
 
 
 def parts(source: Path, folders: Sequence[Path]) -> dict[Path, str]:
-    """The source and, below it, every file of these folders whose module it names."""
+    """The code, without comments, of the source and of the modules below it, in these folders."""
     known = {path.stem: path for d in folders for path in sorted(d.glob("*.*v"))}
     found: dict[Path, str] = {}
     left = [source]
     while left:
         path = left.pop()
         if path not in found:
-            found[path] = path.read_text()
-            left += [known[word] for word in set(re.findall(r"\w+", found[path])) & known.keys()]
+            found[path] = COMMENT.sub("", path.read_text())
+            left += [known[word] for word in set(INSTANCE.findall(found[path])) & known.keys()]
     return found
 
 
 def name_of(chosen: str, source: Path, parameters: Parameters, folders: Sequence[Path]) -> str:
     """A name for what Yosys makes the netlist from, and its version."""
-    total = hashlib.sha256(repr((chosen, source.stem, sorted(parameters.items()))).encode())
-    total.update(version("pyosys").encode())
+    named = repr((chosen, source.stem, sorted(parameters.items()))).replace(f"{ROOT}/", "")
+    total = hashlib.sha256(named.encode() + version("pyosys").encode())
     for path, text in sorted(parts(source, folders).items()):
         total.update(path.name.encode() + text.encode())
     for value in parameters.values():
