@@ -20,9 +20,8 @@ from figures.common import Figure, Quick, console
 from figures.synthesis import SynthesisError
 from twin import netlist_tests
 from twin.build import ROOT, SHORT_RUNS
-from twin.netlist import FAMILIES, NODE_TESTS
+from twin.netlist import BUILD, FAMILIES, NODE_TESTS
 
-BUILD = ROOT / "build" / "netlist"
 LONGEST_S = 24 * 3600
 POWER_UPS = 3  # random states after power-up, of each block
 SEEDS = 3  # of the crossings
