@@ -53,23 +53,8 @@ LISTS = (  # lists of codes or bits with their words
     "update_state",
     "job_flag",
 )
-CODES = (
-    "cause",
-    "state",
-    "calibration_reason",
-    "calibration_action",
-    "scope_trigger",
-    "scope_state",
-    "tick_signal",
-    "tick_trigger",
-    "turn_phase",
-    "peer_phase",
-    "job_state",
-    "job_action",
-    "save_action",
-    "update_action",
-    "update_state",
-)  # lists of codes; the others are lists of bits
+BITS = ("fault", "encoder_event", "flag", "signal_fault", "job_flag")  # of these lists
+CODES = tuple(name for name in LISTS if name not in BITS)
 WORDS = ("cause", "fault", "job_state")  # lists whose words the firmware shows on its panel
 
 

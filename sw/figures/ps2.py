@@ -5,15 +5,13 @@ The bytes are judged by a keyboard and a host in C++ around the Verilated ps2_pa
 sigrok-cli, which knows nothing of our code. The campaign of 10^6 sequences is `make soak K=ps2`.
 """
 
-import re
-import shutil
 import tempfile
 from functools import cache
 from pathlib import Path
 
 from campaigns.campaign import Campaign
-from figures.common import Figure, Quick, bar, console, seeds, shares
-from twin import BuildError
+from figures.common import Absent, Figure, Quick, bar, console, seeds, shares
+from tools import sigrok
 from twin.build import ROOT, run, simulation
 
 PASS = ROOT / "rtl" / "peripheral" / "ps2_pass.sv"
@@ -53,50 +51,30 @@ def sequences(count: int = SEQUENCES, seed: int = 1) -> dict[str, float]:
 
 
 def wrong_by_sigrok(count: int, seed: int) -> int:
-    """Bytes that sigrok does not read as they were typed and injected: the recording, then random
-    sequences.
+    """Bytes that sigrok does not read as they were typed and injected: the recording, where there
+    is one, then random sequences.
     """
-    if not shutil.which("sigrok-cli") or not RECORDING.exists():
-        raise BuildError(f"sigrok-cli (make sigrok) and the recording {RECORDING} are needed")
+    if not sigrok.installed():
+        raise Absent("sigrok-cli is not installed: make sigrok")
+    recorded = TYPED if RECORDING.exists() else b""
     with tempfile.TemporaryDirectory() as folder:
         samples = Path(folder) / "pass.bin"
-        judged, heard = run(
-            [program(), "wave", RECORDING, count, seed, samples], "ps2_run"
-        ).splitlines()
-        text = run(
-            [
-                "sigrok-cli",
-                "-i",
-                samples,
-                "-I",
-                f"binary:numchannels=2:samplerate={CLK_HZ}",
-                "-P",
-                "ps2:clk=0:data=1",
-                "-A",
-                "ps2=word:parity-err",
-            ],
-            "sigrok-cli",
-        )
-    read, want = (
-        bytes(int(word, 16) for word in re.findall(r"Data: (\w\w)", text)),
-        bytes.fromhex(heard),
-    )
-    wrong = (
-        sum(a != b for a, b in zip(read, want))
-        + abs(len(read) - len(want))
-        + text.count("Parity error")
-        + int(judged)
-    )
-    wrong += want[: len(TYPED)] != TYPED
+        before = RECORDING if recorded else "-"
+        words = run([program(), "wave", before, count, seed, samples], "ps2_run")
+        read, errors = sigrok.ps2(samples.read_bytes(), CLK_HZ)
+    judged, heard = words.splitlines()
+    want = bytes.fromhex(heard)
+    wrong = sum(a != b for a, b in zip(read, want)) + abs(len(read) - len(want))
+    wrong += errors + int(judged) + (want[: len(recorded)] != recorded)
     console.print(
-        f"sigrok: {len(read)} bytes read, {wrong} wrong; "
-        f"the first {len(TYPED)} are the recorded keyboard's"
+        f"sigrok: {len(read)} bytes read, {wrong} wrong; the first {len(recorded)} are the "
+        f"recorded keyboard's{'' if recorded else f', for there is no {RECORDING}'}"
     )
     return wrong
 
 
 def ps2_bytes_wrong(by_sigrok: int = BY_SIGROK, count: int = SEQUENCES, seed: int = 1) -> float:
-    """Without sequences for sigrok, sigrok and the recording are not required."""
+    """Without sequences for sigrok, sigrok is not required."""
     wrong = wrong_by_sigrok(by_sigrok, seed) if by_sigrok else 0
     return wrong + sequences(count, seed)["wrong"]
 
@@ -111,8 +89,9 @@ FIGURES = {
     "ps2_bytes_wrong": Figure(
         ps2_bytes_wrong,
         "bytes",
-        "bytes wrong in pass-through and injection: a recorded keyboard and 10^3 sequences read by "
-        "sigrok, 10^4 sequences with cut frames and commands read by our own host",
+        "bytes wrong in pass-through and injection: 10^3 sequences, and a recorded keyboard where "
+        "there is its recording, read by sigrok, 10^4 sequences with cut frames and commands read "
+        "by our own host",
         "0",
         Quick({"by_sigrok": 0, "count": 200}, "200 sequences, without sigrok"),
         0,

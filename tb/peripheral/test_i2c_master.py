@@ -5,9 +5,6 @@ sigrok, random against the model.
 
 import random
 import re
-import shutil
-import subprocess
-from pathlib import Path
 
 import cocotb
 import pytest
@@ -27,6 +24,7 @@ from tb.peripheral.i2c_master import (
     WRITE,
     I2cMaster,
 )
+from tools import sigrok
 
 CLK_HZ, STRETCH_US = 4_000_000, 200
 
@@ -290,36 +288,18 @@ async def any_commands_on_any_wires_match_the_model(dut):
             await bus.quiet(random.randrange(900 if random.random() < 0.5 else 30))
 
 
-@cocotb.test(skip=not shutil.which("sigrok-cli"))
+@cocotb.test(skip=not sigrok.installed())
 async def sigrok_reads_the_same_bytes_and_the_eeprom_operations(dut):
     bus = await Bus(dut, Eeprom(write_clk=400)).begin()
     data = bytes(random.getrandbits(8) for _ in range(5))
     await bus.write(0x1234, data)
     await bus.poll()
     assert await bus.read(0x1234, 5) == data
-    Path("bus.bin").write_bytes(bus.samples)
 
-    def sigrok(decoders, words):
-        out = subprocess.run(
-            [
-                "sigrok-cli",
-                "-i",
-                "bus.bin",
-                "-I",
-                f"binary:numchannels=2:samplerate={CLK_HZ}",
-                "-P",
-                decoders,
-                "-A",
-                words,
-            ],
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=60,
-        )
-        return out.stdout
+    def decoded(decoders, words):
+        return sigrok.decoded(bus.samples, 2, CLK_HZ, decoders, words)
 
-    wire = sigrok("i2c:scl=0:sda=1", "i2c=data-write:data-read:warnings")
+    wire = decoded("i2c:scl=0:sda=1", "i2c=data-write:data-read:warnings")
     assert [int(b, 16) for b in re.findall(r"Data write: (\w\w)", wire)] == [
         0x12,
         0x34,
@@ -332,7 +312,7 @@ async def sigrok_reads_the_same_bytes_and_the_eeprom_operations(dut):
         and "warning" not in wire.lower()
     )
     # the 24AA64 is its nearest: the same commands, half the size and page
-    operations = sigrok(
+    operations = decoded(
         "i2c:scl=0:sda=1,eeprom24xx:chip=microchip_24aa64", "eeprom24xx=page-write:seq-random-read"
     )
     words = data.hex(" ").upper()

@@ -4,9 +4,6 @@ sigrok as listeners.
 """
 
 import random
-import re
-import shutil
-import subprocess
 from fractions import Fraction
 
 import cocotb
@@ -15,6 +12,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import clk_now, run, start
 from tb.serial.uart_rx import UartRx, character
 from tb.serial.uart_tx import UartTx
+from tools import sigrok
 
 BIT_TIMES = [128, 133, 256, 271, 555]  # 1/16 cycle: 8 cycles, …, 115 200 baud at 4 MHz
 
@@ -180,32 +178,11 @@ async def any_offer_matches_the_model(dut):
         await send(dut, sent, bit_time, model=UartTx(), gaps=True)
 
 
-def sigrok(waves, baud, options):
-    """What sigrok's UART decoder reads from the samples, as its own lines of text."""
-    with open("transmitter.bin", "wb") as f:
-        f.write(bytes(waves))
-    rate = 4_000_000
-    out = subprocess.run(
-        [
-            "sigrok-cli",
-            "-i",
-            "transmitter.bin",
-            "-I",
-            f"binary:numchannels=1:samplerate={rate}",
-            "-P",
-            f"uart:rx=0:baudrate={baud}:{options}",
-            "-A",
-            "uart=rx-data:rx-parity-err:rx-warnings",
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
-    return re.findall(r"^uart-1: (.*)$", out.stdout, re.MULTILINE)
+def heard(waves, options):
+    return sigrok.uart(bytes(waves), 4_000_000, f"baudrate=115200:{options}")
 
 
-@cocotb.test(skip=not shutil.which("sigrok-cli"))
+@cocotb.test(skip=not sigrok.installed())
 async def sigrok_reads_nine_bits_and_the_ninth_as_odd_parity(dut):
     """At 115 200 baud and 4 MHz. The command bytes of S0 have an odd parity bit of 1, so that a PC
     without a 9-bit mode can send them.
@@ -214,18 +191,18 @@ async def sigrok_reads_nine_bits_and_the_ninth_as_odd_parity(dut):
     sent = [(0x00, 0), (0xFF, 1), (0x55, 1), (0xAA, 0)] + [
         (random.getrandbits(8), random.getrandbits(1)) for _ in range(20)
     ]
-    heard = sigrok([tx for tx, _ in await send(dut, sent, 555)], 115200, "data_bits=9:parity=none")
-    assert heard == [f"{ninth << 8 | data:03X}" for data, ninth in sent]
+    waves = [tx for tx, _ in await send(dut, sent, 555)]
+    assert heard(waves, "data_bits=9:parity=none") == [
+        f"{ninth << 8 | data:03X}" for data, ninth in sent
+    ]
     commands = [d54 << 4 | address for d54 in (1, 2) for address in (1, 2, 4, 7, 8, 11, 13, 14)]
     waves = [tx for tx, _ in await send(dut, [(c, 1) for c in commands], 555)]
-    assert sigrok(waves, 115200, "data_bits=8:parity=odd") == [f"{c:02X}" for c in commands]
+    assert heard(waves, "data_bits=8:parity=odd") == [f"{c:02X}" for c in commands]
     waves = [
         tx for tx, _ in await send(dut, [(0x13, 1)], 555)
     ]  # 3 has an even number of ones: no odd parity
-    assert "13" in (heard := sigrok(waves, 115200, "data_bits=8:parity=odd")) and len(heard) == 2
+    assert "13" in (found := heard(waves, "data_bits=8:parity=odd")) and len(found) == 2
 
 
 def test_uart_tx():
-    if not shutil.which("sigrok-cli"):
-        print("sigrok-cli is not installed: its reading of the waveform is skipped")
     run("uart_tx", __file__)

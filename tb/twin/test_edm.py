@@ -5,14 +5,12 @@ connected to the model that tests the RTL.
 
 import math
 import random
-import re
-import shutil
-import subprocess
 
 import numpy
 import pytest
 
 from tb.peripheral.ps2_lines import Host, Keyboard
+from tools import sigrok
 from twin import Devices, DevicesBench
 
 CLK_HZ = 400_000
@@ -287,31 +285,11 @@ def test_it_makes_no_cut_where_there_is_no_machine():
     assert bench.cuts == [] and received(bench) == START
 
 
-@pytest.mark.skipif(not shutil.which("sigrok-cli"), reason="sigrok-cli is not installed")
-def test_sigrok_reads_the_same_from_the_cable(tmp_path):
+@pytest.mark.skipif(not sigrok.installed(), reason="no sigrok-cli: make sigrok")
+def test_sigrok_reads_the_same_from_the_cable():
     bench = devices_bench()
     keys = [random.randrange(1, 0x84) for _ in range(50)] + START
     bench.type(keys)
     levels = bench.cable(0.1)
-    file = tmp_path / "wave.bin"
-    file.write_bytes((levels["edm_clock"] | levels["edm_data"] << 1).tobytes())
-    out = subprocess.run(
-        [
-            "sigrok-cli",
-            "-i",
-            file,
-            "-I",
-            f"binary:numchannels=2:samplerate={CLK_HZ}",
-            "-P",
-            "ps2:clk=0:data=1",
-            "-A",
-            "ps2=word:parity-err",
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
-    assert [
-        int(word, 16) for word in re.findall(r"Data: (\w\w)", out.stdout)
-    ] == keys and "err" not in out.stdout
+    samples = (levels["edm_clock"] | levels["edm_data"] << 1).tobytes()
+    assert sigrok.ps2(samples, CLK_HZ) == (bytes(keys), 0)

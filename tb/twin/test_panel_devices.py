@@ -5,12 +5,10 @@ an I2C master that sets the pins.
 
 import random
 import re
-import shutil
-import subprocess
 
-import numpy
 import pytest
 
+from tools import sigrok
 from twin import Devices, DevicesBench
 
 CLK_HZ, BUS_HZ = 2_000_000, 100_000
@@ -468,48 +466,18 @@ def test_what_does_not_exist_is_refused(panel):
             call()
 
 
-def decoded(levels, rate, names, folder, *arguments):
-    file = folder / "wave.bin"
-    file.write_bytes(numpy.asarray(levels, dtype=numpy.uint8).tobytes())
-    out = subprocess.run(
-        [
-            "sigrok-cli",
-            "-i",
-            file,
-            "-I",
-            f"binary:numchannels={names}:samplerate={rate}",
-            *arguments,
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
-    return out.stdout
-
-
-needs_sigrok = pytest.mark.skipif(
-    not shutil.which("sigrok-cli"), reason="sigrok-cli is not installed"
-)
+needs_sigrok = pytest.mark.skipif(not sigrok.installed(), reason="no sigrok-cli: make sigrok")
 
 
 @needs_sigrok
-def test_sigrok_reads_the_same_from_the_bus(panel, master, tmp_path):
+def test_sigrok_reads_the_same_from_the_bus(panel, master):
     master.recorded = []
     data = [0xDE, 0xAD, 0xBE, 0xEF]
     assert master.send(EEPROM, [*address_bytes(0x0123), *data])
     panel.run(5e-3)
     assert master.fetch(EEPROM, 4, address_bytes(0x0123)) == data
-    out = decoded(
-        master.recorded,
-        4 * BUS_HZ,
-        2,
-        tmp_path,
-        "-P",
-        "i2c:scl=0:sda=1,eeprom24xx:chip=microchip_24lc64",
-        "-A",
-        "eeprom24xx=ops",
-    )
+    decoders = "i2c:scl=0:sda=1,eeprom24xx:chip=microchip_24lc64"
+    out = sigrok.decoded(bytes(master.recorded), 2, 4 * BUS_HZ, decoders, "eeprom24xx=ops")
     assert re.findall(r"(write|read) \(addr=(\w+), 4 bytes\): ([\w ]+)", out) == [
         ("write", "0123", "DE AD BE EF"),
         ("read", "0123", "DE AD BE EF"),
@@ -517,20 +485,12 @@ def test_sigrok_reads_the_same_from_the_bus(panel, master, tmp_path):
 
 
 @needs_sigrok
-def test_sigrok_reads_the_same_from_the_numeric_display(panel, tmp_path):
+def test_sigrok_reads_the_same_from_the_numeric_display(panel):
     record = {"levels": {}, "rows": []}
     for register, value in ((9, 0xFF), (11, 7), (12, 1), (1, 5), (2, 0x83)):
         show(panel, register, value, record)
-    out = decoded(
-        record["rows"],
-        1_000_000,
-        3,
-        tmp_path,
-        "-P",
-        "spi:clk=0:mosi=1:cs=2,max7219",
-        "-A",
-        "max7219=register:digit",
-    )
+    decoders, words = "spi:clk=0:mosi=1:cs=2,max7219", "max7219=register:digit"
+    out = sigrok.decoded(bytes(record["rows"]), 3, 1_000_000, decoders, words)
     assert re.findall(r"Shutdown: (\w+)|Digit (\d): (\w+)", out) == [
         ("off", "", ""),
         ("", "1", "05"),
