@@ -47,9 +47,14 @@ def run(top, test, **parameters):
     simulator.run(top, test, seed(), parameters)
 
 
+def on_netlist():
+    """Whether a test runs on a netlist in place of the RTL."""
+    return bool(os.environ.get("NETLIST"))
+
+
 def rtl_only(reason):
-    """In a cocotb test: skip it on a netlist, for a reason such as what it reads inside."""
-    if os.environ.get("NETLIST"):
+    """In a test: skip it on a netlist, for a reason such as what it reads inside."""
+    if on_netlist():
         pytest.skip(reason)
 
 

@@ -163,14 +163,11 @@ def prepared(
     of these faults.
     """
     top = source.stem
-    change = "".join(f" -set {name} {netlist.literal(value)}" for name, value in values.items())
 
     def make(folder: Path) -> None:
         lists = lists_of(folder, top, count, seed, faults)
         passes = [
-            f"read_verilog -sv {source}",
-            f"chparam{change} {top}" if change else "",
-            f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
+            *netlist.elaboration(source, values, folders),
             f"prep -top {top}; write_json {folder}/interface.json",
             "opt_expr -mux_undef; opt_clean",  # a word that is not written has an address too
             f"write_rtlil {folder}/{ELABORATED}",

@@ -61,11 +61,8 @@ def pair(
         "ports"
     ]
     if not (folder / PAIR).exists():
-        change = "".join(f" -set {name} {netlist.literal(v)}" for name, v in values.items())
         passes = [
-            f"read_verilog -sv -formal {source}",
-            f"chparam{change} {top}" if change else "",
-            f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
+            *netlist.elaboration(source, values, folders, formal=True),
             f"prep -flatten -top {top}; chformal -assert -cover -live -fair -remove",
             f"rename {top} {CONTRACT}; write_rtlil {folder}/{CONTRACT}.il; design -reset",
             f"read_rtlil {folder}/{block.MUTATED}; hierarchy -top {top}; flatten; opt_clean",

@@ -221,16 +221,30 @@ def wrapper(top: str, module: dict[str, Any]) -> str:
     return f"{head}\n{declared}\n);\n    {top}{SUFFIX} u_netlist (\n{joined}\n    );\nendmodule\n"
 
 
+def elaboration(
+    source: Path, parameters: Parameters, folders: Sequence[Path], formal: bool = False
+) -> list[str]:
+    """Passes of Yosys that read a module with these parameters, and those below it from these
+    folders; with the properties in their code if `formal`. Yosys (0.70) may read a module again
+    once it knows those below, and then call it by its parameters: it gets its own name back.
+    """
+    top = source.stem
+    change = "".join(f" -set {name} {literal(value)}" for name, value in parameters.items())
+    return [
+        f"read_verilog -sv {'-formal ' if formal else ''}{source}",
+        f"chparam{change} {top}" if change else "",
+        f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
+        f"rename -top {top}",
+    ]
+
+
 def synthesise(
     chosen: str, source: Path, parameters: Parameters, folders: Sequence[Path], out: Path
 ) -> None:
     """Yosys writes netlist.v and the interface of the module into the folder `out`."""
     top, family = source.stem, chosen.split()[0]
-    change = "".join(f" -set {name} {literal(value)}" for name, value in parameters.items())
     passes = [
-        f"read_verilog -sv {source}",
-        f"chparam{change} {top}" if change else "",
-        f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in folders)}",
+        *elaboration(source, parameters, folders),
         "design -save elaborated; proc",
         f"write_json {out}/interface.json",
         f"design -load elaborated; synth_{chosen} -top {top}",

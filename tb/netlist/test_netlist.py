@@ -83,6 +83,23 @@ def test_a_netlist_is_made_once_and_again_after_a_change(tmp_path, monkeypatch):
     assert written[4] not in written[:4]
 
 
+def test_a_block_that_yosys_reads_again_once_it_knows_those_below_keeps_its_name(tmp_path):
+    """It does so for a '0 at a port, whose width is known below only."""
+    (tmp_path / "below.sv").write_text(
+        "module below #(parameter int W = 1) (input wire signed [W:0] a, output wire b);\n"
+        "assign b = a < 0;\nendmodule\n"
+    )
+    block = tmp_path / "above.sv"
+    block.write_text(
+        "module above #(parameter int W = 1) (output wire b);\n"
+        "below #(.W(W)) u_below (.a('0), .b);\nendmodule\n"
+    )
+    netlist.synthesise("ecp5", block, {"W": 5}, [tmp_path], tmp_path)
+    said = (tmp_path / "synthesis.log").read_text()
+    assert "Reprocessing module above" in said
+    assert "module above_netlist" in (tmp_path / "netlist.v").read_text()
+
+
 def test_a_wrong_family_a_wrong_parameter_and_a_wrong_source_are_errors(tmp_path, monkeypatch):
     monkeypatch.setattr(netlist, "BUILD", tmp_path / "netlist")
     source = ROOT / "rtl" / "common" / "synchroniser.sv"
