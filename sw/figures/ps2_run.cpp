@@ -7,9 +7,9 @@
 //   ps2_run delay COUNT SEED                   keys alone: the longest delay, in us beyond the ten
 //                                              bits of our frame
 //   ps2_run wave RECORDING COUNT SEED FILE     a recorded keyboard (none if RECORDING is -), then
-//                                              COUNT sequences, on wires that are written to FILE for another decoder: one
-//                                              byte per cycle, clock | data << 1; prints the bytes
-//                                              that it must find
+//                                              COUNT sequences, on wires that are written to FILE
+//                                              for another decoder: one byte per cycle, clock |
+//                                              data << 1; prints the bytes that it must find
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
