@@ -35,6 +35,7 @@ from boards.packing import PLACED, pack, packing_hash
 from boards.toml_file import ROOT, Misfit, TooLarge, shown
 from figures.synthesis import SynthesisError, placed, yosys
 from firmware import build as firmware
+from twin.netlist import elaboration
 
 OUT = ROOT / "build" / "boards"
 NOTE = "note"  # of what the bitstream in a folder was made of
@@ -174,7 +175,7 @@ def state(design: Design) -> str:
     here = Path(__file__)
     sources = sorted((ROOT / "rtl").rglob("*.sv")) + [ROOT / "requirements.lock", here]
     sources += [here.with_name(name) for name in ("family.py", "global_reset.py", "gowin.lock")]
-    sources.append(Path(inspect.getfile(yosys)))
+    sources += [Path(inspect.getfile(each)) for each in (yosys, elaboration)]
     sources += ethernet.SOURCES if design.ethernet else ()
     found = hashlib.sha256((design.board.part.synthesis + told(design)).encode())
     for path in sources:

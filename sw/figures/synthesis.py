@@ -10,13 +10,14 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from figures.common import Quick, seeds
 from twin.build import CORES, ROOT
+from twin.netlist import Parameters, elaboration
 
 BUILD = ROOT / "build" / "synthesis"
 LONGEST_S = 3 * 3600  # of a tool; a router may find no way through a nearly full part, and try on
@@ -36,8 +37,6 @@ ELABORATED = Quick(
     "> 0",
     "cells",
 )
-
-Parameters = Mapping[str, int | str]
 
 
 class SynthesisError(Exception):
@@ -73,10 +72,6 @@ def run(command: Sequence[object], step: str, log: Path) -> None:
         raise SynthesisError(f"{step} failed: {errors[-1]} (log: {log.relative_to(ROOT)})")
 
 
-def quoted(value: int | str) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value)
-
-
 def source_of(top: str) -> Path:
     source = next((ROOT / "rtl").rglob(f"{top}.sv"), None)
     if not source:
@@ -105,12 +100,9 @@ def yosys(source: Path, parameters: Parameters, last: str, tag: str, first: str 
     folder.mkdir(parents=True, exist_ok=True)
     libraries = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")}) + cores()
     netlist = folder / "netlist.json"
-    change = "".join(f" -set {name} {quoted(value)}" for name, value in parameters.items())
     passes = [
         first,
-        f"read_verilog -sv {source.relative_to(ROOT)}",
-        f"chparam{change} {top}" if change else "",
-        f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in libraries)}",
+        *elaboration(source.relative_to(ROOT), parameters, libraries),
         last.format(top=top, netlist=netlist.relative_to(ROOT)),
     ]
     command = [sys.executable, ROOT / "tools" / "yosys.py", "; ".join(passes)]
