@@ -54,7 +54,8 @@ module actuator #(
     output logic               dac_sclk,        // pin, idles low
     output logic               dac_sdi,         // pin, data of the DAC
     // state
-    output logic               downward,        // level: the next step goes down
+    output logic               own_step,        // level: a step is made
+    output logic               own_downward,    // level: that step and the next go down
     output logic signed [15:0] fine_command,    // of the fine stage, full scale 2^15
     output logic               fine_saturated,  // level: the fine stage is at its limit
     output logic               step_overrun     // level: too many steps are overdue
@@ -100,10 +101,7 @@ module actuator #(
         .dac_valid,
         .dac_command,
         // stepper
-        .direction,
-        .direction_low,
-        .stepper_selected,
-        .downward
+        .stepper_selected
     );
 
     if (HAS_BRIDGE != 0) begin : g_bridge
@@ -123,7 +121,9 @@ module actuator #(
     end
 
     if (HAS_STEPPER != 0) begin : g_stepper
-        wire allowed;
+        wire allowed, upward;
+
+        assign own_downward = !upward;
 
         step_permission u_permission (
             .enable,
@@ -157,11 +157,13 @@ module actuator #(
             // pins and state
             .step,
             .direction,
+            .pulse  (own_step),
+            .upward,
             .steps,
             .overrun(step_overrun)
         );
     end else begin : g_no_stepper
-        assign {step, direction, step_overrun, steps} = '0;
+        assign {step, direction, own_step, own_downward, step_overrun, steps} = '0;
         assign line_stopped = 1'b1;
         wire unused_motion = &{1'b0, block_up, block_down, line_up, line_down};
         wire unused_lines = &{

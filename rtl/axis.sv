@@ -193,7 +193,7 @@ module axis #(
     // interlock and drive
     wire [12:0] causes_now, first_fault;
     wire signed [47:0] fault_position;
-    wire downward, fine_saturated;
+    wire own_step, own_downward, fine_saturated;
 
     axis_inputs u_inputs (
         .clk,
@@ -264,8 +264,8 @@ module axis #(
         .adc_sclk,
         .compare_pulse,
         // own steps
-        .own_step     (step),
-        .own_downward (downward),
+        .own_step,
+        .own_downward,
         // backlash
         .result_valid,
         .result_kind,
@@ -447,7 +447,8 @@ module axis #(
             .dac_sclk,
             .dac_sdi,
             // state
-            .downward,
+            .own_step,
+            .own_downward,
             .fine_command,
             .fine_saturated,
             .step_overrun
@@ -458,7 +459,7 @@ module axis #(
         assign {drive_enable, faults, causes_now, first_fault, fault_position} = '0;
         assign {bridge_a, bridge_b, step, direction} = '0;
         assign {dac_cs_n, dac_sclk, dac_sdi} = 3'b100;
-        assign {actuator_rdata, downward, fine_command, fine_saturated} = '0;
+        assign {actuator_rdata, own_step, own_downward, fine_command, fine_saturated} = '0;
         assign line_stopped = 1'b1;
 
         wire unused_bus = &{1'b0, actuator_select, start};

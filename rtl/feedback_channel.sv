@@ -63,8 +63,8 @@ module feedback_channel #(
     output logic adc_sclk,  // pin, idles high
     output logic compare_pulse,  // pin, high during a compare pulse
     // the axis' own steps
-    input wire own_step,  // level of the step output
-    input wire own_downward,  // level: the next own step goes down
+    input wire own_step,  // level: a step is made
+    input wire own_downward,  // level: that step and the next go down
     // backlash
     input wire result_valid,  // strobe: a result of motion_engine is new, and of this axis
     input wire [2:0] result_kind,  // number of what it is

@@ -17,13 +17,10 @@ module drive_select (
     input  wire signed  [15:0] command,           // full scale 2^15
     input  wire                fine_valid,        // strobe: fine_command is new
     input  wire signed  [15:0] fine_command,      // full scale 2^15
-    input  wire                direction,         // pin of the stepper driver
-    input  wire                direction_low,     // setting: direction is low going up
     output logic               bridge_enable,     // level: the bridge may switch
     output logic               stepper_selected,  // level: the drive is a stepper driver
     output logic               dac_valid,         // strobe: dac_command is new
-    output logic signed [15:0] dac_command,       // full scale 2^15
-    output logic               downward           // level: the next step goes down
+    output logic signed [15:0] dac_command        // full scale 2^15
 );
     wire dac_selected = kind == 2'd2;
 
@@ -31,7 +28,6 @@ module drive_select (
     assign stepper_selected = kind == 2'd1;
     assign dac_valid        = dac_selected ? valid : fine_valid;
     assign dac_command      = dac_selected ? command : fine_command;
-    assign downward         = direction == direction_low;
 
 `ifdef FORMAL
     always_comb begin

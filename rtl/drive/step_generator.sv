@@ -19,9 +19,10 @@
 //           and at a line with rate_steep.
 // model     tb/drive/step_generator.py, equal in every bit of every cycle
 // proved    Whatever the inputs do, without rst and as long as the timings do not change: steps
-//           moves with the pins, in every mode; high, low, set-up and hold are never shorter than
-//           set; the pins change at the ends of a pulse and with a turn, otherwise only in the
-//           cycle that takes mode and polarity, which is at standstill and while enable is low.
+//           moves with pulse and with the pins, in every mode; high, low, set-up and hold are never
+//           shorter than set; the pins change at the ends of a pulse and with a turn, otherwise
+//           only in the cycle that takes mode and polarity, which is at standstill and while enable
+//           is low.
 // proof     depth 18, TIME_W = 3, RATE_F = 3, AHEAD_W = 4
 `default_nettype none
 
@@ -49,6 +50,8 @@ module step_generator #(
     output logic                     stopped,        // level: no line is followed until a restart
     output logic                     step,           // level: pin
     output logic                     direction,      // level: pin, high going up
+    output logic                     pulse,          // level: a step is made, in every mode
+    output logic                     upward,         // level: that step and the next go up
     output logic signed [      31:0] steps,          // steps made since reset; wraps
     output logic                     overrun         // level: stopped until restart or enable low
 );
@@ -71,7 +74,7 @@ module step_generator #(
     // is due from 0 on, a step down below 0
     logic signed [W-1:0] ahead;  // 2^-RATE_F step
     // turning: direction has changed since the last step
-    logic pulse, upward, turning;
+    logic                turning;
     // acted: a step or a turn was made; reverses: the line is behind the last step made
     logic acted, reverses;
     // cycles since the level began; since the hold time began, or the set-up time in a turn; both
@@ -218,7 +221,8 @@ module step_generator #(
             if (stopped) assert (!rise && !turns);
         end
         if (past && !$past(rst)) begin
-            // steps moves with the pins
+            // steps moves with pulse and upward, and with the pins
+            assert (made == (pulse && !$past(pulse) ? (upward ? 1 : -1) : 0));
             if (wire_mode == QUADRATURE && !rewired && !$past(rewired))
                 assert (2'(wire_place - place_q) == 2'(made));
             if (wire_mode == STEP_DIRECTION && !rewired && !$past(rewired))

@@ -4,7 +4,7 @@
 BRIDGE, STEPPER, DAC = range(3)
 
 
-def selected(kind, enable, valid, command, fine_valid, fine_command, direction, direction_low):
+def selected(kind, enable, valid, command, fine_valid, fine_command):
     """Every output by its port name."""
     dac_valid, dac_command = (valid, command) if kind == DAC else (fine_valid, fine_command)
     return dict(
@@ -12,5 +12,4 @@ def selected(kind, enable, valid, command, fine_valid, fine_command, direction, 
         stepper_selected=int(kind == STEPPER),
         dac_valid=dac_valid,
         dac_command=dac_command,
-        downward=int(direction == direction_low),
     )

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model of rtl/drive/step_generator.sv in integers: clk(...) advances one cycle and returns (step,
-direction, steps, overrun, stopped) after it.
+direction, pulse, upward, steps, overrun, stopped) after it.
 """
 
 STEP_DIRECTION, QUADRATURE = 0, 1
@@ -44,7 +44,8 @@ class StepGenerator:
         self.ahead, self.reverses, self.acted = 0, False, self.upward
 
     def shown(self):
-        return *self.pins, signed(self.steps, 32), int(self.overrun), int(self.stopped)
+        own = int(self.pulse), int(self.upward)
+        return *self.pins, *own, signed(self.steps, 32), int(self.overrun), int(self.stopped)
 
     def levels(self):
         """The levels of the pins in this state."""

@@ -18,10 +18,8 @@ QUIET = dict(
     command=0,
     fine_valid=0,
     fine_command=0,
-    direction=0,
-    direction_low=0,
 )
-LEVELS = ("enable", "valid", "fine_valid", "direction", "direction_low")
+LEVELS = ("enable", "valid", "fine_valid")
 
 
 async def outputs(dut, **inputs):

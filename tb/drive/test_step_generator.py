@@ -57,6 +57,7 @@ class Generator:
         return self
 
     async def clk(self, rst=0, **inputs):
+        """(step, direction, steps, overrun) after a cycle with these inputs."""
         once = ONCE | {name: inputs.pop(name) for name in ONCE if name in inputs}
         self.inputs.update(inputs)
         levels = self.inputs | once | dict(rst=rst)
@@ -65,17 +66,17 @@ class Generator:
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
         dut = self.dut
-        ports = (dut.overrun, dut.stopped)
         got = (
-            *(int(dut.step.value), int(dut.direction.value), dut.steps.value.to_signed()),
-            *(int(port.value) for port in ports),
+            *(int(port.value) for port in (dut.step, dut.direction, dut.pulse, dut.upward)),
+            *(dut.steps.value.to_signed(), int(dut.overrun.value), int(dut.stopped.value)),
         )
         want = self.model.clk(**levels)
         assert got == want, (
-            f"{levels}: step, direction, steps, overrun, stopped are {got}, the model has {want}"
+            f"{levels}: step, direction, pulse, upward, steps, overrun, stopped are {got}, "
+            f"the model has {want}"
         )
         self.seen.append(got[:2])
-        return got[:4]
+        return *got[:2], *got[4:6]
 
     async def wait(self, clks):
         for _ in range(clks):

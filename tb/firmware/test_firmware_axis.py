@@ -428,22 +428,6 @@ def test_with_another_count_the_zero_is_unknown(name):
     assert machine.request("move", axis=0, target=PERIOD)[0] == "not_homed"
 
 
-PAIR = ("step_output", 1), ("position_source", 2)  # own steps are pulse and direction
-
-
-@pytest.mark.parametrize("first, second", [PAIR, PAIR[::-1]])
-def test_own_steps_as_the_position_and_steps_of_another_kind_exclude_each_other(first, second):
-    machine = CompiledNode()
-    (name, value), (other, refused) = first, second
-    machine.set(**{name: value})
-    fields = {"axis": 0, "parameter": PARAMETER[other]["id"]}
-    assert machine.request("set_parameter", **fields, value=refused)[0] == "out_of_range"
-    assert machine.ask("get_parameter", **fields)["value"] == 0
-    machine.set(**{name: 0})
-    machine.ask("set_parameter", **fields, value=refused)
-    assert machine.ask("get_parameter", **fields)["value"] == refused
-
-
 def test_a_drive_that_was_not_built_is_refused():
     machine = CompiledNode(absent=("stepper", "dac", "fine_stage"))
     for name, value in (("drive", 1), ("drive", 2), ("fine_reach", 65536)):

@@ -108,7 +108,6 @@ def test_saved_parameters_are_restored_to_the_last_bit():
         counts[low], counts[high] = sorted((counts[low], counts[high]))
         # what the firmware refuses together
         counts["home_method"] = source.choice([-2, -1, 1, 2, 17, 18, 33, 34, 35, 37])
-        counts["step_output"] *= counts["position_source"] < 2
         counts["fine_reach"] *= counts["drive"] < 2
         for name, value in counts.items():
             node.force(name, value)
@@ -124,8 +123,6 @@ def test_saved_parameters_are_restored_to_the_last_bit():
 @pytest.mark.parametrize(
     "before, loaded",
     [
-        ({"step_output": 1}, {"position_source": "own_steps", "step_output": "step_and_direction"}),
-        ({"position_source": 2}, {"step_output": "quadrature", "position_source": "counts"}),
         ({"fine_reach": 5}, {"drive": "dac", "fine_reach": "0nm"}),
         ({"drive": 2}, {"fine_reach": "100nm", "drive": "bridge"}),
         ({"segments": 2}, {"segment_count": "7", "segments": "off"}),
@@ -143,8 +140,6 @@ def test_parameters_that_exclude_each_other_are_loaded_in_any_order(before, load
 @pytest.mark.parametrize(
     "before, name, value, words",
     [
-        ({"step_output": 2}, "position_source", "own_steps", "step_output pulses"),
-        ({"position_source": 2}, "step_output", "pulses", "step_output pulses"),
         ({"drive": 2}, "fine_reach", "100nm", "drive dac and fine_reach 100nm"),
         ({"fine_reach": 65536}, "drive", "dac", "drive dac and fine_reach 800nm"),
     ],

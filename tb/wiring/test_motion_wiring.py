@@ -502,13 +502,18 @@ def test_a_pressed_switch_stops_the_steps_into_it(node):
         node.set_bit(pin, axis, 0)
 
 
-def test_own_steps_are_the_position_of_a_stepper_without_a_scale(node):
+@pytest.mark.parametrize("mode, low", [(0, 0), (0, 1), (1, 1), (2, 1)])
+def test_own_steps_are_the_position_of_a_stepper_whatever_its_pins_show(node, mode, low):
     node.start()
     for axis in (0, 1):
         node.write("feedback.decoder_mode", 3, axis=axis)
         node.write("feedback.position_source", counts=1, steps=1, axis=axis)
         node.write("actuator.drive", 1, axis=axis)
         node.write("actuator.step_ratio", 4 << 32, axis=axis)
+        node.run(640)
+        node.write("actuator.step_output", mode=mode, step_low=low, direction_low=low, axis=axis)
+        node.run(640)
+        assert node.read("axis.position", axis=axis) == 0, "of a polarity"
         node.enable(axis)
         node.ticks(3)
         for sign, expected in ((1, 4), (-1, 0), (-1, -4)):
@@ -516,6 +521,11 @@ def test_own_steps_are_the_position_of_a_stepper_without_a_scale(node):
             node.ticks(10)
             assert node.read("actuator.steps", axis=axis) == expected
             assert node.read("axis.position", axis=axis) == expected * COUNT
+        # the pins take another polarity only while the drive is off
+        node.write("actuator.step_output", mode=mode, direction_low=1 - low, axis=axis)
+        play(node, axis, 0x4000, 4)
+        node.ticks(10)
+        assert node.read("axis.position", axis=axis) == 0
 
 
 def words(node, axis, names=("dac_cs_n", "dac_sclk", "dac_sdi")):

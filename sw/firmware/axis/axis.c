@@ -388,14 +388,8 @@ static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value) {
         if (value == DAC_OUTPUT && parameters_get(n, BUS_PARAMETER_FINE_REACH))
             return BUS_CAUSE_OUT_OF_RANGE;
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
-    case BUS_PARAMETER_POSITION_SOURCE:  // own steps are counted as pulse and direction
-        if (value == OWN_STEPS && parameters_get(n, BUS_PARAMETER_STEP_OUTPUT))
-            return BUS_CAUSE_OUT_OF_RANGE;
-        return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
+    case BUS_PARAMETER_POSITION_SOURCE:
     case BUS_PARAMETER_STEP_OUTPUT:
-        if (value && parameters_get(n, BUS_PARAMETER_POSITION_SOURCE) == OWN_STEPS)
-            return BUS_CAUSE_OUT_OF_RANGE;
-        return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
     case BUS_PARAMETER_STEP_INVERT: return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
     case BUS_PARAMETER_SEGMENT_COUNT:
     case BUS_PARAMETER_SEGMENT_LENGTH:

@@ -24,10 +24,8 @@ TRAVEL = ("travel_low", "travel_high")
 FEEDBACK = ("kd", "kp", "ki")  # in the order to raise them: what damps comes first
 FEEDFORWARD = ("kv", "ka")
 GAINS = (*FEEDBACK, *FEEDFORWARD)
-# the node refuses this value of the first together with another than 0 of the second
-EXCLUSIVE = (("position_source", "own_steps", "step_output"), ("drive", "dac", "fine_reach"))
 # while one of these is on, the node refuses values of others: they are switched off first
-OFF_FIRST = ("step_output", "fine_reach", "segments")
+OFF_FIRST = ("fine_reach", "segments")
 
 
 class Tuning(Protocol):
@@ -123,12 +121,10 @@ class AxisParameters(AxisAccess):
             raise OutOfRange(f"travel_high ({high}) would lie below travel_low ({low})")
         if travel is not None and period_nm in (None, self.period_nm):
             self.check_inside(*(value.value for value in travel))
-        for first, choice, second in EXCLUSIVE:
-            found = pair(first, second)
-            if found and found[0].counts == CHOICES[first].index(choice) and found[1].counts:
-                raise OutOfRange(
-                    f"{first} {choice} and {second} {found[1].written(6)} do not go together"
-                )
+        # the DAC is either the drive or that of the fine stage
+        found = pair("drive", "fine_reach")
+        if found and found[0].counts == CHOICES["drive"].index("dac") and found[1].counts:
+            raise OutOfRange(f"drive dac and fine_reach {found[1].written(6)} do not go together")
 
     def check_inside(self, low: Fraction, high: Fraction) -> None:
         """Raises OutOfRange when a homed axis is outside this travel (nm), by more than a signal
