@@ -528,6 +528,24 @@ def test_own_steps_are_the_position_of_a_stepper_whatever_its_pins_show(node, mo
         assert node.read("axis.position", axis=axis) == 0
 
 
+def test_an_own_step_counts_when_its_pulse_begins(node):
+    node.start()
+    for axis in (0, 1):
+        node.write("feedback.decoder_mode", 3, axis=axis)
+        node.write("feedback.position_source", counts=1, steps=1, axis=axis)
+        node.write("actuator.drive", 1, axis=axis)
+        node.write("actuator.step_ratio", 4 << 32, axis=axis)
+        node.write("actuator.step_pulse", high=16000, low=10, axis=axis)
+        node.enable(axis)
+        node.ticks(3)
+        play(node, axis, 0x4000, 1)
+        node.ticks(10)
+        for pin in (1, 0):
+            assert node.get("step") >> axis & 1 == pin
+            assert node.read("axis.position", axis=axis) == COUNT
+            node.run(16000)
+
+
 def words(node, axis, names=("dac_cs_n", "dac_sclk", "dac_sdi")):
     """The words of 16 bits that a serial output has sent, and the time of their ends."""
     cs, clock, data = names
