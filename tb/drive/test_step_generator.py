@@ -282,6 +282,18 @@ async def enable_low_finishes_the_pulse_and_enable_high_again_does_not_jump(dut)
 
 
 @cocotb.test()
+async def no_step_begins_from_the_cycle_on_in_which_enable_falls(dut):
+    for cycles in range(16, 24):
+        generator = await Generator(dut).reset()
+        await generator.clk(rate_valid=1, rate=1 << RATE_F - 3)  # a step per 8 cycles
+        await generator.clk(line_start=1, line_idle=0)
+        made = (await generator.wait(cycles))[2]
+        for enable in (0, 1):
+            assert (await generator.clk(enable=enable))[2] == made > 0
+            assert (await generator.wait(20))[2] == made
+
+
+@cocotb.test()
 async def a_restart_makes_no_step(dut):
     generator = await Generator(dut).reset(target=0, period=40)
     for target in (3, 3):
