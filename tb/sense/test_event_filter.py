@@ -159,6 +159,30 @@ async def the_longest_setting_passes_after_exactly_that_many_samples(dut):
 
 
 @cocotb.test()
+async def every_bit_of_the_settings_and_of_the_counters_counts(dut):
+    bench = await Bench.begin(dut)
+    powers = [1 << bit for bit in range(int(dut.SKIP_W.value))]
+    for seen in powers[: int(dut.W.value)]:
+        await bench.set(0, seen + 1, 0)
+        assert (await bench.play([1] * seen + [0]))[-1] == (0, 1)
+        for level in (1, 0):
+            out = await bench.play([level] * (seen + 1))
+            assert [filtered for filtered, _ in out] == [1 - level] * seen + [level]
+    for tolerated in powers[: int(dut.TOLERATED_W.value)]:
+        await bench.set(0, 2, tolerated)
+        assert (await bench.play([1] + [0] * (tolerated + 1)))[-1] == (0, 1)
+        assert (await bench.play([1] + [0] * tolerated + [1]))[-1] == (1, 0)
+        await bench.play([0] * 2)
+    for skip in powers:
+        await bench.set(skip, 1, 0)
+        changes = []
+        for level in (1, 0):
+            out = await bench.play([level] * (skip + 1))
+            changes.append([filtered for filtered, _ in out].index(level))
+        assert changes[0] == changes[1], "a sample per skip + 1 cycles"
+
+
+@cocotb.test()
 async def levels_do_not_disturb_each_other(dut):
     bench = await Bench.begin(dut)
     await bench.set(0, 3, 0)
