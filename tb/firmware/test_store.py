@@ -138,6 +138,28 @@ def test_a_missing_eeprom_is_reported_and_found_when_it_comes():
     assert station.load(EVENLY) == "ok"
 
 
+def test_an_eeprom_in_exchange_for_another_one_begins_with_generation_1():
+    station = powered()
+    assert [station.load(EVENLY) for _ in range(3)] == ["ok"] * 3
+    station.power_cut()
+    station.eeprom.memory[:] = b"\xff" * len(station.eeprom.memory)
+    station.ready()
+    assert station.load(EVENLY) == "ok" and station.ask("job_stations")["generation"] == 1
+
+
+def test_a_node_says_that_it_writes_until_all_is_saved():
+    station = powered()
+    assert station.ask("job_stations")["writing"] == 0
+    station.ask("job_begin")
+    station.ask("job_add", station=0, angle=5)
+    station.ask("job_save")
+    assert station.ask("job_stations")["writing"] == 1
+    assert station.saved() == "ok" and station.ask("job_stations")["writing"] == 0
+    absent = Station(absent=["eeprom"])
+    absent.run(2000)
+    assert absent.ask("job_stations")["writing"] == 0
+
+
 def test_an_eeprom_that_fails_for_a_moment_leaves_the_settings_as_they_are():
     station = powered()
     limit = SETTING["job_cut_limit"]

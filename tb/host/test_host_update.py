@@ -24,7 +24,15 @@ from moire.made.registers import MAP_CRC
 from tb.bench import seed
 from tb.fakes.bus_node import BusNode
 from tb.fakes.rs485_bus import Rs485Bus
-from twin.compiled.flash_node import SECTOR, SPACING, START, FlashBus, FlashNode, SerialFlash
+from twin.compiled.flash_node import (
+    SECTOR,
+    SPACING,
+    START,
+    TRIAL_MS,
+    FlashBus,
+    FlashNode,
+    SerialFlash,
+)
 
 ENTRY = struct.Struct("<6I")  # magic, generation, bytes, CRC-32 of image, map and entry
 ENTRY_AT, MARK_AT = SPACING - SECTOR, SPACING - SECTOR + 256
@@ -55,12 +63,15 @@ class Desk:
         first = START + image * SPACING + at
         return slice(first, first + count)
 
+    def entry(self, image):
+        """The entry of an image, without its CRC-32."""
+        words = ENTRY.unpack(self.board.flash.content[self.bytes_of(image, ENTRY_AT, ENTRY.size)])
+        return dict(zip(("magic", "generation", "bytes", "image", "map"), words, strict=False))
+
     def enter(self, image, **changes):
         """Change the entry of an image, with a right CRC-32 and mark."""
         where = self.bytes_of(image, ENTRY_AT, ENTRY.size)
-        names = ("magic", "generation", "bytes", "image", "map")
-        words = dict(zip(names, ENTRY.unpack(self.board.flash.content[where]), strict=False))
-        head = struct.pack("<5I", *{**words, **changes}.values())
+        head = struct.pack("<5I", *{**self.entry(image), **changes}.values())
         crc = zlib.crc32(head)
         self.board.flash.content[where] = head + struct.pack("<I", crc)
         mark = self.bytes_of(image, MARK_AT, 4)
@@ -99,6 +110,40 @@ def test_each_update_goes_into_the_image_that_is_not_in_use_and_the_factory_imag
     content = desk.board.flash.content
     assert content[START:].startswith(FACTORY) and not any(content[:START])
     assert content[desk.bytes_of(2, 0, 4096)] == PROGRAMS[1]
+
+
+def test_each_update_is_one_generation_newer_than_the_newest(desk):
+    generations = []
+    for n in (0, 1, 2):
+        image = desk.update(n).image
+        generations.append((image, desk.entry(image)["generation"]))
+    assert generations == [(1, 1), (2, 2), (1, 3)]
+
+
+def test_an_entry_of_the_factory_image_does_not_count(desk):
+    desk.update(0)
+    content = desk.board.flash.content
+    desk.enter(1, generation=9)
+    content[desk.bytes_of(0, 0, SPACING)] = content[desk.bytes_of(1, 0, SPACING)]
+    desk.enter(1, generation=1)
+    assert desk.power_up().image == 1
+    assert desk.update(1).image == 2 and desk.entry(2)["generation"] == 2
+
+
+def test_firmware_that_is_confirmed_still_runs_when_its_trial_would_have_ended(desk):
+    desk.update(0)
+    core = desk.board.core
+    for _ in range(TRIAL_MS + 1):
+        desk.board.millisecond()
+    assert desk.board.core is core, "it is not started again"
+
+
+@pytest.mark.parametrize("size", [1, SECTOR - 1, SECTOR, SECTOR + 1, 2 * SECTOR + 1])
+def test_all_sectors_of_a_program_are_erased_before_it_is_written(desk, size):
+    content, program = desk.board.flash.content, random.Random(seed()).randbytes(size)
+    content[desk.bytes_of(1, 0, SPACING)] = bytes(SPACING)
+    desk.bus.node().update(firmware(program=program))
+    assert content[desk.bytes_of(1, 0, size)] == program
 
 
 def test_progress_names_each_phase_in_order(desk):
