@@ -40,16 +40,16 @@ def miter(ports: dict[str, Any], number: int) -> str:
     inputs, outputs = ports_text(ports, "input"), ports_text(ports, "output")
     same = "".join(f", .{name}({name})" for name, _ in inputs)
     lines = ["module miter (", ",\n".join(f"  input wire {w} {n}" for n, w in inputs)]
-    lines += [",\n  output wire bad\n);", f"  {CONTRACT} u_contract ({same[2:]});"]
+    lines += [",\n  output wire miter_differs\n);", f"  {CONTRACT} u_contract ({same[2:]});"]
     for copy, selected in (("good", 0), ("mutated", number)):
         lines += [f"  wire {w} {copy}_{n};" for n, w in outputs]
         joined = "".join(f", .{n}({copy}_{n})" for n, _ in outputs)
         lines += [f"  mutated u_{copy} (.{block.SELECTOR}({selected}){same}{joined});"]
     differs = " || ".join(f"good_{n} != mutated_{n}" for n, _ in outputs)
     if {"clk", "rst"} <= {n for n, _ in inputs}:
-        lines += ["  reg begun = 1'b0;", "  always @(posedge clk) if (rst) begun <= 1'b1;"]
-        differs = f"begun && ({differs})"
-    return "\n".join([*lines, f"  assign bad = {differs};", "endmodule\n"])
+        lines += ["  reg miter_begun = 1'b0;", "  always @(posedge clk) if (rst) miter_begun <= 1'b1;"]
+        differs = f"miter_begun && ({differs})"
+    return "\n".join([*lines, f"  assign miter_differs = {differs};", "endmodule\n"])
 
 
 def pair(
