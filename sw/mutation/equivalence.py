@@ -47,7 +47,8 @@ def miter(ports: dict[str, Any], number: int) -> str:
         lines += [f"  mutated u_{copy} (.{block.SELECTOR}({selected}){same}{joined});"]
     differs = " || ".join(f"good_{n} != mutated_{n}" for n, _ in outputs)
     if {"clk", "rst"} <= {n for n, _ in inputs}:
-        lines += ["  reg miter_begun = 1'b0;", "  always @(posedge clk) if (rst) miter_begun <= 1'b1;"]
+        lines += ["  reg miter_begun = 1'b0;"]
+        lines += ["  always @(posedge clk) if (rst) miter_begun <= 1'b1;"]
         differs = f"miter_begun && ({differs})"
     return "\n".join([*lines, f"  assign miter_differs = {differs};", "endmodule\n"])
 
