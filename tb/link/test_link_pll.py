@@ -11,7 +11,7 @@ import pytest
 from cocotb.triggers import FallingEdge
 
 from tb.bench import rtl_only, run, seed, start
-from tb.link.link_pll import FULL, GAIN, INTEGRAL, NAMES, PATIENCE, RANGE, LinkPll
+from tb.link.link_pll import FULL, GAIN, INTEGRAL, NAMES, PATIENCE, PENALTY, RANGE, LinkPll
 from tb.ports import Ports
 
 PERIOD, LEAD = 2048, 400
@@ -201,6 +201,43 @@ async def the_ends_of_the_ranges_and_noise_match_the_model(dut):
         often = random.choice([0.0004, 0.002, 0.5])
         for _ in range(30_000):
             await bench.clk(random.random() < often, random.random() < 0.00002)
+
+
+@cocotb.test()
+async def any_state_and_settings_match_the_model_at_the_moments_that_count(dut):
+    """Those are the end of a period, the arrival and the capture; long periods and large errors
+    take too long to get there by themselves.
+    """
+    rtl_only("it sets the registers inside")
+    bench = await begin(dut)
+    for _ in range(400):
+        period = random.choice((random.randrange(2048, 1 << 20), 2048 << random.randrange(9)))
+        lead = random.randrange(3 * period // 8)
+        await bench.clk(enable=0)
+        bench.levels |= {"period": period, "lead": lead}
+        half = period // 2
+        moment = random.choice((half - 3, -lead - 4, random.randrange(-half, half - 6)))
+        state = {
+            "runs": 1,
+            "phase": moment,
+            "trim": random.randrange(-RANGE * INTEGRAL, RANGE * INTEGRAL),
+            "fraction": random.randrange(INTEGRAL),
+            "score": random.choice((0, 1, PENALTY, FULL - 1, FULL, random.randrange(FULL))),
+            "missed": random.choice((PATIENCE - 1, random.randrange(PATIENCE))),
+            "seen": random.getrandbits(1),
+            "locked": random.getrandbits(1),
+            "error": random.choice((-1, 1))
+            * random.choice((period // 4, 1, random.randrange(half))),
+        }
+        for name, value in state.items():
+            setattr(bench.model, name, value)
+            register = getattr(dut, name)
+            register.value = value % (1 << len(register))
+        for _ in range(6):
+            await bench.clk(arrived=int(random.random() < 0.2))
+            assert {name: int(getattr(dut, name).value) for name in state} == {
+                name: getattr(bench.model, name) % (1 << len(getattr(dut, name))) for name in state
+            }
 
 
 def followed(arrivals, period=PERIOD, lead=LEAD):
