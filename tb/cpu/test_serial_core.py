@@ -73,6 +73,7 @@ async def every_instruction_and_access_width_has_the_right_result(dut):
 @cocotb.test()
 async def latency_is_1_wait_cycle_for_memory_and_3_for_a_register(dut):
     """An operation takes 36 to 38 cycles, and all others 66 to 110."""
+    rtl_only("whether an access is one of memory is known inside only")
     registers = await begin(dut)
     waited, times, cycles, last = {}, [], None, 0
     for n in range(5000):
@@ -110,6 +111,7 @@ async def every_wrong_access_traps_and_reset_starts_the_core_again(dut):
 
 @cocotb.test()
 async def a_register_access_waits_until_the_registers_are_ready(dut):
+    rtl_only("that the core waits is known inside only")
     registers = await begin(dut)
     dut.ready.value = 0
     await registers.clk()
