@@ -170,7 +170,7 @@ module actuator #(
             1'b0, line_start, line_idle, rate_valid, rate, rate_restart, rate_steep
         };
         wire unused_times = &{1'b0, high_cycles, low_cycles, setup_cycles, hold_cycles};
-        wire unused_settings = &{1'b0, mode, step_low, stepper_selected};
+        wire unused_settings = &{1'b0, mode, step_low, direction_low, stepper_selected};
     end
 
     if (HAS_FINE_STAGE != 0) begin : g_fine
