@@ -13,7 +13,9 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export PYTHONDONTWRITEBYTECODE :=
 
 RTL      := $(shell find rtl -name '*.sv' | sort)
-LINTED   := $(RTL:%.sv=build/lint/%.ok)
+# tops around the modules; what LiteX generates stands in that of the Ethernet core
+BENCHES  := $(filter-out %/ethernet_bench.sv,$(wildcard sw/figures/*_bench.sv)) $(wildcard sw/embed/examples/*.sv)
+LINTED   := $(patsubst %.sv,build/lint/%.ok,$(RTL) $(BENCHES))
 FIRMWARE := build/firmware/firmware.hex
 LITEX    := build/litex/stamp
 GOWIN    := build/gowin/stamp
@@ -48,8 +50,8 @@ promises: $(SETUP)  ## what the project promises of its code: units, latencies, 
 	@printf '%s\n' $(PROMISES) | xargs -P $(JOBS) -I{} $(PYTHON) -m tools.check_{}
 PROMISES := types imports tests columns ports latency casts
 
-lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the layout of all code
-	$(call say,lint: verilator -Wall over $(words $(RTL)) modules; ruff; the formatters)
+lint: $(SETUP)   ## verilator -Wall over every module and bench, ruff over the Python, the layout of all code
+	$(call say,lint: verilator -Wall over $(words $(RTL)) modules and $(words $(BENCHES)) benches; ruff; the formatters)
 	@$(MAKE) -k -j$(JOBS) $(LINTED)
 	@$(PYTHON) -m ruff check -q --output-format concise .
 	@$(PYTHON) -m ruff format -q --check .

@@ -23,6 +23,8 @@ module steps_bench (
 );
     wire line_start, line_idle, rate_valid, rate_restart, rate_steep, stopped;
     wire signed [36:0] rate;
+    wire pulse, upward;
+    wire unused = &{1'b0, pulse, upward};
 
     step_lines u_lines (
         .clk,
@@ -61,6 +63,8 @@ module steps_bench (
         .stopped,
         .step,
         .direction,
+        .pulse,
+        .upward,
         .steps,
         .overrun
     );
