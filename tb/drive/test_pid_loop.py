@@ -211,6 +211,25 @@ async def the_ends_of_every_range_match_the_model(dut):
 
 
 @cocotb.test()
+async def every_bit_of_the_gains_and_of_the_limit_has_its_part_alone(dut):
+    loop = await Loop(dut).reset()
+    none = dict(kp=0, ki=0, kd=0)
+    for n in range(24):
+        # 64 or more counts of command; a gain that is kept for a tick too long would show in it
+        error, slow = 1 << max(0, 22 - n), 1 << max(0, 30 - n)
+        for gain, change in (("kp", error), ("ki", slow), ("kd", error)):
+            await loop.tick(**none | {gain: 1 << n}, limit=LIMIT, target=0)
+            for sign in (1, -1):
+                await loop.tick(target=sign * change)
+            await loop.tick(**none, target=random.randrange(-100, 100))
+    for n in range(15):
+        for limit in (1 << n, LIMIT ^ 1 << n):
+            for sign in (1, -1):
+                await loop.tick(kp=ONE, limit=limit, target=sign << 20)
+                await loop.tick(kp=ONE, limit=LIMIT, target=sign * limit)
+
+
+@cocotb.test()
 async def random_ticks_and_a_reset_in_mid_flow_match_the_model(dut):
     loop = await Loop(dut).reset()
     for n in range(300):
