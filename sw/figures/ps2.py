@@ -13,11 +13,10 @@ from campaigns.campaign import Campaign
 from figures.common import Absent, Figure, Quick, bar, console, seeds, shares
 from tools import sigrok
 from twin.build import ROOT, run, simulation
+from twin.recordings import KEYBOARD, TYPED
 
 PASS = ROOT / "rtl" / "peripheral" / "ps2_pass.sv"
 DRIVER = Path(__file__).with_name("ps2_run.cpp")
-RECORDING = ROOT.parent / "shared" / "captures" / "ps2_keyboard_asdfgh.csv"
-TYPED = bytes.fromhex("1cf01c 1bf01b 23f023 2bf02b 34f034 33f033")  # the recording: a s d f g h
 CLK_HZ = 400_000
 SEQUENCES = 10**4
 SHARE = 1000  # sequences of one run, each with a seed of its own
@@ -56,10 +55,10 @@ def wrong_by_sigrok(count: int, seed: int) -> int:
     """
     if not sigrok.installed():
         raise Absent("sigrok-cli is not installed: make sigrok")
-    recorded = TYPED if RECORDING.exists() else b""
+    recorded = TYPED if KEYBOARD.exists() else b""
     with tempfile.TemporaryDirectory() as folder:
         samples = Path(folder) / "pass.bin"
-        before = RECORDING if recorded else "-"
+        before = KEYBOARD if recorded else "-"
         words = run([program(), "wave", before, count, seed, samples], "ps2_run")
         read, errors = sigrok.ps2(samples.read_bytes(), CLK_HZ)
     judged, heard = words.splitlines()
@@ -68,7 +67,7 @@ def wrong_by_sigrok(count: int, seed: int) -> int:
     wrong += errors + int(judged) + (want[: len(recorded)] != recorded)
     console.print(
         f"sigrok: {len(read)} bytes read, {wrong} wrong; the first {len(recorded)} are the "
-        f"recorded keyboard's{'' if recorded else f', for there is no {RECORDING}'}"
+        f"recorded keyboard's{'' if recorded else f', for there is no {KEYBOARD}'}"
     )
     return wrong
 

@@ -19,8 +19,8 @@ from cocotb.triggers import ClockCycles, FallingEdge
 
 from tb import bench
 from tb.decode.quadrature_decoder import PULSES, X4
+from twin.recordings import CAPTURES
 
-CAPTURES = bench.ROOT.parent / "shared" / "captures"
 RECORDINGS = [("hdns2000_fast", X4), ("hdns2000_left_right", X4), ("smoothieware_steps", PULSES)]
 ROWS = 5000  # longest part of a recording that is used
 STABLE = 5  # setting of the deglitchers, cycles

@@ -10,10 +10,11 @@ from fractions import Fraction
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import ROOT, run, start
+from tb.bench import run, start
 from tb.drive.step_generator import StepGenerator
 from tb.drive.step_lines import TOO_FAR, rate_of, wrapped
 from tools import sigrok
+from twin.recordings import CAPTURES
 
 TIME_W, RATE_F, AHEAD_W = 5, 26, 6
 ONE = 1 << 16
@@ -30,7 +31,7 @@ IDLE = dict(
     line_idle=1,
 )
 ONCE = dict.fromkeys(("line_start", "rate_valid", "rate", "rate_restart", "rate_steep"), 0)
-RECORDING = ROOT.parent / "shared" / "captures" / "smoothieware_steps.csv"
+RECORDING = CAPTURES / "smoothieware_steps.csv"
 SLOWER = 50  # samples of the recording per cycle
 RECORDED = 150  # steps of the recording that are played
 

@@ -12,31 +12,11 @@ from cocotb.triggers import FallingEdge, Timer
 
 from tb import bench
 from tb.peripheral.ps2_host import Ps2Host, frame
+from twin.recordings import KEYBOARD, TYPED
 
 CLK_HZ = 400_000
 US = CLK_HZ / 1e6
 BIT = round(80 * US)
-RECORDING = bench.ROOT.parent / "shared" / "captures" / "ps2_keyboard_asdfgh.csv"
-TYPED = [
-    0x1C,
-    0xF0,
-    0x1C,
-    0x1B,
-    0xF0,
-    0x1B,
-    0x23,
-    0xF0,
-    0x23,
-    0x2B,
-    0xF0,
-    0x2B,
-    0x34,
-    0xF0,
-    0x34,
-    0x33,
-    0xF0,
-    0x33,
-]
 
 
 class Side:
@@ -246,13 +226,13 @@ async def reset_lets_go_of_both_lines(dut):
     assert side.bytes == []
 
 
-@cocotb.test(skip=not RECORDING.exists())
+@cocotb.test(skip=not KEYBOARD.exists())
 async def a_recorded_keyboard_is_read(dut):
     """The keys a s d f g h of a real keyboard; its pauses are shortened to 1 ms, and the pull of
     its host after each byte is part of the recording.
     """
     side = await Side(dut).begin()
-    with open(RECORDING, newline="") as lines:
+    with open(KEYBOARD, newline="") as lines:
         rows = [
             tuple(map(int, row)) for row in csv.reader(line for line in lines if line[0].isdigit())
         ]
@@ -291,8 +271,8 @@ async def any_lines_match_the_model(dut):
 
 
 def test_ps2_host():
-    if not RECORDING.exists():
-        print(f"no recording {RECORDING}: its test is skipped")
+    if not KEYBOARD.exists():
+        print(f"no recording {KEYBOARD}: its test is skipped")
     bench.run("ps2_host", __file__, CLK_HZ=CLK_HZ)
 
 

@@ -12,8 +12,8 @@ from cocotb.triggers import FallingEdge
 from tb import bench
 from tb.peripheral.ps2_lines import Host, Keyboard, Party
 from tb.peripheral.ps2_pass import Ps2Pass
-from tb.peripheral.test_ps2_host import RECORDING, TYPED
 from tools import sigrok
+from twin.recordings import KEYBOARD, TYPED
 
 CLK_HZ = 400_000
 MS = CLK_HZ // 1000
@@ -234,7 +234,7 @@ class Recording(Party):
     """The recorded lines of a real keyboard and its host; pauses are shortened to 5 ms."""
 
     def live(self):
-        with open(RECORDING, newline="") as lines:
+        with open(KEYBOARD, newline="") as lines:
             rows = [
                 tuple(map(int, row))
                 for row in csv.reader(line for line in lines if line[0].isdigit())
@@ -247,7 +247,7 @@ class Recording(Party):
             yield
 
 
-@cocotb.test(skip=not RECORDING.exists() or not sigrok.installed())
+@cocotb.test(skip=not KEYBOARD.exists() or not sigrok.installed())
 async def a_recorded_keyboard_passes_and_sigrok_reads_it_with_the_injection_after_it(dut):
     """sigrok takes the clock of a pulling host for the twelfth bit of a byte: this host pulls once
     after each, as the recorded one.
@@ -257,11 +257,11 @@ async def a_recorded_keyboard_passes_and_sigrok_reads_it_with_the_injection_afte
     wires.inject = list(START)
     await wires.run(until=lambda: len(wires.host.received) == len(TYPED) + len(START))
     await wires.run(2 * MS)
-    assert wires.host.received == TYPED + START
-    assert sigrok.ps2(wires.samples, CLK_HZ) == (bytes(TYPED + START), 0)
+    assert wires.host.received == [*TYPED, *START]
+    assert sigrok.ps2(wires.samples, CLK_HZ) == (bytes([*TYPED, *START]), 0)
 
 
 def test_ps2_pass():
-    if not RECORDING.exists() or not sigrok.installed():
+    if not KEYBOARD.exists() or not sigrok.installed():
         print("no recording or no sigrok-cli (make sigrok): one test is skipped")
     bench.run("ps2_pass", __file__, CLK_HZ=CLK_HZ)
