@@ -39,10 +39,10 @@ class Wires:
         want = self.model.step(word is not None, word or 0, self.half_period, rst)
         got = tuple(int(p.value) for p in (d.ready, d.cs_n, d.sclk, d.sdi, d.sent))
         assert got == want, f"{got} where the model has {want}"
-        self.watch(*got[1:])
+        self.watch(*got[1:], rst)
         return got
 
-    def watch(self, cs_n, sclk, sdi, sent):
+    def watch(self, cs_n, sclk, sdi, sent, rst):
         self.now += 1
         before, self.last = self.last, (cs_n, sclk)
         if before[0] and not cs_n:
@@ -50,7 +50,7 @@ class Wires:
         if sclk and not before[1]:
             self.bits, self.risen = [*self.bits, sdi], self.now
         rises = cs_n and not before[0]
-        assert sent == (rises and len(self.bits) == 16)
+        assert sent == (rises and len(self.bits) == 16 and not rst)
         if rises:
             self.rose = self.now
             self.taken.append(
@@ -111,6 +111,21 @@ async def reset_in_mid_word_frees_the_wires(dut):
     assert (await wires.clk(rst=1))[1:] == (1, 0, 0, 0)
     await wires.send(0x1234)
     assert wires.taken == [None, 0x1234]
+
+
+@cocotb.test()
+async def a_reset_in_any_cycle_of_a_word_and_another_half_period_after_it_match_the_model(dut):
+    wires = await Wires(dut).begin()
+    for cycles in range(36 * 2 + 3):
+        wires.half_period = 2
+        await wires.clk(random.getrandbits(16))
+        for _ in range(cycles):
+            await wires.clk()
+        wires.half_period = random.randrange(256)
+        await wires.clk(random.getrandbits(16), rst=1)  # not taken
+        wires.half_period, word = random.randrange(4), random.getrandbits(16)
+        await wires.send(word)
+        assert wires.taken[-1] == word
 
 
 def test_spi_word_sender():
