@@ -13,8 +13,8 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export PYTHONDONTWRITEBYTECODE :=
 
 RTL      := $(shell find rtl -name '*.sv' | sort)
-# tops around the modules; what LiteX generates stands in that of the Ethernet core
-BENCHES  := $(filter-out %/ethernet_bench.sv,$(wildcard sw/figures/*_bench.sv)) $(wildcard sw/embed/examples/*.sv)
+# tops of figures; the one of the Ethernet core contains what LiteX generates
+BENCHES  := $(filter-out %/ethernet_bench.sv,$(wildcard sw/figures/*_bench.sv))
 LINTED   := $(patsubst %.sv,build/lint/%.ok,$(RTL) $(BENCHES))
 FIRMWARE := build/firmware/firmware.hex
 LITEX    := build/litex/stamp
