@@ -9,6 +9,7 @@ builds with different parameters that its tests make. What no test sees and what
 """
 
 import argparse
+import fcntl
 import fnmatch
 import json
 import os
@@ -119,8 +120,10 @@ def tests() -> dict[str, list[Path]]:
     return found
 
 
-def pytest(arguments: Sequence[object], environment: dict[str, str]) -> str:
-    """What pytest prints; an error if a test fails."""
+def pytest(
+    arguments: Sequence[object], environment: dict[str, str], kept: Sequence[int] = ()
+) -> str:
+    """What pytest prints; an error if a test fails. It keeps the files `kept` open until its end."""
     done = subprocess.run(
         [
             sys.executable,
@@ -139,6 +142,7 @@ def pytest(arguments: Sequence[object], environment: dict[str, str]) -> str:
         capture_output=True,
         text=True,
         timeout=LONGEST_S,
+        pass_fds=kept,
     )
     if done.returncode:
         raise MutationError(f"pytest {arguments[-1]}: {(done.stdout + done.stderr)[-1500:]}")
@@ -253,11 +257,18 @@ def judge(block: str, runs: Runs, looks: Runs = ()) -> Verdicts:
 
 
 def simulated(folder: Path, block: str, **asked: object) -> Runs:
-    """The runs of the tests of a block, with mutants as they are asked for."""
+    """The runs of the tests of a block, with mutants as they are asked for. It is an error while
+    others run, also those that a killed campaign has left: they would write the same files.
+    """
     folder.mkdir()
     request = folder / "request"
     request.write_text(json.dumps({"block": block, **asked}))
-    pytest(tests()[block], {"MUTANTS": str(request)})
+    with open(BUILD / f"{block}.lock", "w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise MutationError(f"{block}: other tests of its mutants still run") from None
+        pytest(tests()[block], {"MUTANTS": str(request)}, [lock.fileno()])
     return Run.all(folder)
 
 

@@ -3,6 +3,7 @@
 block, and reasons that are kept for existing lines only.
 """
 
+import fcntl
 import json
 from pathlib import Path
 
@@ -143,6 +144,14 @@ def test_a_block_with_a_test_of_its_own_is_found():
     files = blocks.tests()
     assert files["tick_divider"] == [ROOT / "tb" / "common" / "test_tick_divider.py"]
     assert "recorded_encoder" not in files, "it is a bench"
+
+
+def test_mutants_are_refused_while_others_of_the_block_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(blocks, "BUILD", tmp_path)
+    with open(tmp_path / "tick_divider.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with pytest.raises(blocks.MutationError, match="^tick_divider: other tests"):
+            blocks.simulated(tmp_path / "runs", "tick_divider", count=1, seed=1, faults=[])
 
 
 def test_the_request_of_another_block_is_refused(tmp_path):
