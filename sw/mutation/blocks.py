@@ -123,7 +123,7 @@ def tests() -> dict[str, list[Path]]:
 def pytest(
     arguments: Sequence[object], environment: dict[str, str], kept: Sequence[int] = ()
 ) -> str:
-    """What pytest prints; an error if a test fails. It keeps the files `kept` open until its end."""
+    """What pytest prints; an error if a test fails. It keeps the files `kept` open to its end."""
     done = subprocess.run(
         [
             sys.executable,
