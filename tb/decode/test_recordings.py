@@ -8,7 +8,6 @@ without any edge is cut to STILL cycles, eight times the setting of the deglitch
 edges and every shorter distance are kept.
 """
 
-import csv
 import os
 import random
 from itertools import accumulate, islice, pairwise
@@ -19,7 +18,7 @@ from cocotb.triggers import ClockCycles, FallingEdge
 
 from tb import bench
 from tb.decode.quadrature_decoder import PULSES, X4
-from twin.recordings import CAPTURES
+from twin.recordings import CAPTURES, rows
 
 RECORDINGS = [("hdns2000_fast", X4), ("hdns2000_left_right", X4), ("smoothieware_steps", PULSES)]
 ROWS = 5000  # longest part of a recording that is used
@@ -32,13 +31,9 @@ def recording(name):
     """Rows of (duration in cycles, xa, xb, ya, yb); a is step, b is direction where these are
     recorded.
     """
-    with open(CAPTURES / f"{name}.csv", newline="") as lines:
-        rows = [
-            tuple(map(int, row))
-            for row in islice(csv.reader(line for line in lines if line[0].isdigit()), ROWS)
-        ]
-    ends = [row[0] for row in rows[1:]] + [rows[-1][0] + STILL]
-    return [(min(end - row[0], STILL), *row[1:]) for row, end in zip(rows, ends)]
+    changes = list(islice(rows(CAPTURES / f"{name}.csv"), ROWS))
+    ends = [row[0] for row in changes[1:]] + [changes[-1][0] + STILL]
+    return [(min(end - row[0], STILL), *row[1:]) for row, end in zip(changes, ends)]
 
 
 def offline(levels, mode):

@@ -3,7 +3,6 @@
 against the model in every cycle. The rates of the lines are those of step_lines.
 """
 
-import csv
 import random
 from fractions import Fraction
 
@@ -14,7 +13,7 @@ from tb.bench import run, start
 from tb.drive.step_generator import StepGenerator
 from tb.drive.step_lines import TOO_FAR, rate_of, wrapped
 from tools import sigrok
-from twin.recordings import CAPTURES
+from twin.recordings import CAPTURES, rows
 
 TIME_W, RATE_F, AHEAD_W = 5, 26, 6
 ONE = 1 << 16
@@ -418,9 +417,8 @@ def recorded():
     """Positions of a real machine's axis, once per period, as its controller stepped it: the first
     steps of the recording, and back again.
     """
-    with open(RECORDING, newline="") as lines:
-        rows = [tuple(map(int, row[:2])) for row in csv.reader(lines) if row[0].isdigit()]
-    edges = [sample for (_, before), (sample, step) in zip(rows, rows[1:]) if step > before][
+    changes = [row[:2] for row in rows(RECORDING)]
+    edges = [sample for (_, before), (sample, step) in zip(changes, changes[1:]) if step > before][
         :RECORDED
     ]
     period = SLOWER * PERIOD

@@ -3,7 +3,6 @@
 lines against the model.
 """
 
-import csv
 import random
 
 import cocotb
@@ -12,7 +11,7 @@ from cocotb.triggers import FallingEdge, Timer
 
 from tb import bench
 from tb.peripheral.ps2_host import Ps2Host, frame
-from twin.recordings import KEYBOARD, TYPED
+from twin.recordings import KEYBOARD, TYPED, rows
 
 CLK_HZ = 400_000
 US = CLK_HZ / 1e6
@@ -232,11 +231,10 @@ async def a_recorded_keyboard_is_read(dut):
     its host after each byte is part of the recording.
     """
     side = await Side(dut).begin()
-    with open(KEYBOARD, newline="") as lines:
-        rows = [
-            tuple(map(int, row)) for row in csv.reader(line for line in lines if line[0].isdigit())
-        ]
-    for (at, clock, data), (end, _, _) in zip(rows, [*rows[1:], (rows[-1][0] + 24_000, 1, 1)]):
+    changes = list(rows(KEYBOARD))
+    for (at, clock, data), (end, _, _) in zip(
+        changes, [*changes[1:], (changes[-1][0] + 24_000, 1, 1)]
+    ):
         length = min((end - at) / 24, 1000)  # us
         if length > 2:  # what the deglitcher takes away
             await side.clk(clock, data, n=round(length * US))

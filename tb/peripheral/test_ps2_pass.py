@@ -3,7 +3,6 @@
 cuts, commands, damage, injections. It equals the model.
 """
 
-import csv
 import random
 
 import cocotb
@@ -13,7 +12,7 @@ from tb import bench
 from tb.peripheral.ps2_lines import Host, Keyboard, Party
 from tb.peripheral.ps2_pass import Ps2Pass
 from tools import sigrok
-from twin.recordings import KEYBOARD, TYPED
+from twin.recordings import KEYBOARD, TYPED, rows
 
 CLK_HZ = 400_000
 MS = CLK_HZ // 1000
@@ -234,12 +233,8 @@ class Recording(Party):
     """The recorded lines of a real keyboard and its host; pauses are shortened to 5 ms."""
 
     def live(self):
-        with open(KEYBOARD, newline="") as lines:
-            rows = [
-                tuple(map(int, row))
-                for row in csv.reader(line for line in lines if line[0].isdigit())
-            ]
-        for (at, clock, data), (end, _, _) in zip(rows, rows[1:]):
+        changes = list(rows(KEYBOARD))
+        for (at, clock, data), (end, _, _) in zip(changes, changes[1:]):
             self.clock_low, self.data_low = 1 - clock, 1 - data
             yield from self.wait(min((end - at) / 24, 5000))
         self.clock_low = self.data_low = 0
