@@ -14,7 +14,7 @@ needs_sigrok = pytest.mark.skipif(not sigrok.installed(), reason="no sigrok-cli:
 
 @needs_sigrok
 def test_all_bytes_are_read_without_a_recorded_keyboard(monkeypatch, tmp_path):
-    monkeypatch.setattr(ps2, "RECORDING", tmp_path / "none.csv")
+    monkeypatch.setattr(ps2, "KEYBOARD", tmp_path / "none.csv")
     assert ps2.wrong_by_sigrok(5, seed=1) == 0
 
 
