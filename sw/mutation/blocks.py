@@ -257,8 +257,8 @@ def judge(block: str, runs: Runs, looks: Runs = ()) -> Verdicts:
 
 
 def simulated(folder: Path, block: str, **asked: object) -> Runs:
-    """The runs of the tests of a block, with mutants as they are asked for. It is an error while
-    others run, also those that a killed campaign has left: they would write the same files.
+    """The runs of the tests of a block, with mutants as they are asked for. They wait for others of
+    the block, also for those that a killed campaign has left: they would write the same files.
     """
     folder.mkdir()
     request = folder / "request"
@@ -267,7 +267,8 @@ def simulated(folder: Path, block: str, **asked: object) -> Runs:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise MutationError(f"{block}: other tests of its mutants still run") from None
+            print(f"{block}: waits for other tests of its mutants, which still run", flush=True)
+            fcntl.flock(lock, fcntl.LOCK_EX)
         pytest(tests()[block], {"MUTANTS": str(request)}, [lock.fileno()])
     return Run.all(folder)
 

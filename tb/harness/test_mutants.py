@@ -5,6 +5,7 @@ block, and reasons that are kept for existing lines only.
 
 import fcntl
 import json
+import threading
 from pathlib import Path
 
 import pytest
@@ -146,12 +147,22 @@ def test_a_block_with_a_test_of_its_own_is_found():
     assert "recorded_encoder" not in files, "it is a bench"
 
 
-def test_mutants_are_refused_while_others_of_the_block_run(tmp_path, monkeypatch):
+def test_mutants_wait_while_others_of_the_block_run(tmp_path, monkeypatch):
     monkeypatch.setattr(blocks, "BUILD", tmp_path)
+    waits, over, begun_after = threading.Event(), threading.Event(), []
+    monkeypatch.setattr(blocks, "print", lambda *_, **__: waits.set(), raising=False)
+    monkeypatch.setattr(blocks, "pytest", lambda *_: begun_after.append(over.is_set()))
     with open(tmp_path / "tick_divider.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        with pytest.raises(blocks.MutationError, match="^tick_divider: other tests"):
-            blocks.simulated(tmp_path / "runs", "tick_divider", count=1, seed=1, faults=[])
+        asked = {"count": 1, "seed": 1, "faults": []}
+        run = threading.Thread(
+            target=blocks.simulated, args=(tmp_path / "runs", "tick_divider"), kwargs=asked
+        )
+        run.start()
+        assert waits.wait(60), "it did not say that it waits"
+        over.set()
+    run.join()
+    assert begun_after == [True]
 
 
 def test_the_request_of_another_block_is_refused(tmp_path):
