@@ -78,9 +78,9 @@ def steady_only(reason):
 
 
 def needs(condition, reason):
-    """In a cocotb test: skip it unless the parameters that the design was built with fulfil its
-    condition; a test that returns early
-    would count as passed."""
+    """In a test: skip it unless its condition is fulfilled, such as one of the parameters that the
+    design was built with; a test that returns early would count as passed.
+    """
     if not condition:
         pytest.skip(reason)
 

@@ -172,6 +172,12 @@ async def a_transfer_that_is_cut_in_any_bit_of_its_request_is_broken(dut):
         read = await follower.transfer(request_of(), bits)
         assert (follower.breaks, follower.cuts, follower.requests) == (1, 1, [])
         assert not any(read) and not follower.left
+    await follower.clk(writes=layout.MOST_VALUES)
+    sent = request_of(layout.MOST_VALUES)
+    for whole_bytes in (1 << n for n in range((len(sent) - 1).bit_length())):
+        follower.begin()
+        await follower.transfer(sent, 8 * whole_bytes)
+        assert (follower.breaks, follower.cuts, follower.requests) == (1, 1, [])
     follower.begin()
     await follower.transfer(b"")
     assert (follower.breaks, follower.cuts) == (0, 0), "a transfer without a bit is nothing"
