@@ -52,6 +52,11 @@ def on_netlist():
     return bool(os.environ.get("NETLIST"))
 
 
+def with_mutants():
+    """Whether a test runs on the netlist of its block with mutants."""
+    return bool(os.environ.get("MUTANTS"))
+
+
 def rtl_only(reason):
     """In a test: skip it on a netlist, for a reason such as what it reads inside."""
     if on_netlist():
@@ -62,7 +67,7 @@ def generated(dut, block, number, name):
     """A signal in a generate block of the design; in a netlist with mutants the block is a part of
     its name.
     """
-    if os.environ.get("MUTANTS"):
+    if with_mutants():
         return dut[f"\\{block}[{number}].{name} "]
     return getattr(getattr(dut, block)[number], name)
 

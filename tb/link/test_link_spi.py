@@ -166,18 +166,17 @@ async def requests_of_both_ends_of_the_range_and_of_random_lengths_are_taken_who
 @cocotb.test()
 async def a_transfer_that_is_cut_in_any_bit_of_its_request_is_broken(dut):
     follower = await begin(dut)
-    whole = 8 * len(request_of())
-    for bits in (*range(1, 10), whole - 8, whole - 1, random.randrange(1, whole)):
-        follower.begin()
-        read = await follower.transfer(request_of(), bits)
-        assert (follower.breaks, follower.cuts, follower.requests) == (1, 1, [])
-        assert not any(read) and not follower.left
-    await follower.clk(writes=layout.MOST_VALUES)
-    sent = request_of(layout.MOST_VALUES)
-    for whole_bytes in (1 << n for n in range((len(sent) - 1).bit_length())):
-        follower.begin()
-        await follower.transfer(sent, 8 * whole_bytes)
-        assert (follower.breaks, follower.cuts, follower.requests) == (1, 1, [])
+    whole, most = 8 * len(request_of()), 8 * len(request_of(layout.MOST_VALUES))
+    for writes, cuts in (
+        (0, (*range(1, 10), whole - 8, whole - 1, random.randrange(1, whole))),
+        (layout.MOST_VALUES, [8 << n for n in range(most.bit_length()) if 8 << n < most]),
+    ):
+        await follower.clk(writes=writes)
+        for bits in cuts:
+            follower.begin()
+            read = await follower.transfer(request_of(writes), bits)
+            assert (follower.breaks, follower.cuts, follower.requests) == (1, 1, [])
+            assert not any(read) and not follower.left
     follower.begin()
     await follower.transfer(b"")
     assert (follower.breaks, follower.cuts) == (0, 0), "a transfer without a bit is nothing"
