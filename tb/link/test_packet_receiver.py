@@ -4,6 +4,7 @@ and any traffic against the model in every cycle.
 """
 
 import random
+import struct
 
 import cocotb
 from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
@@ -179,6 +180,49 @@ async def the_longest_request_fills_its_bank(dut):
     receiver.settings["writes"] = writes
     values = [random.getrandbits(32) for _ in range(writes)]
     assert await receiver.send(link(0, writes).request(0, values)) == "accepted"
+
+
+@cocotb.test()
+async def the_limit_of_writes_is_122(dut):
+    receiver, writes = await begin(dut), 122
+    receiver.settings["writes"] = writes
+    request = [layout.KIND_REQUEST | SESSION << 8, 1, *[0] * (layout.FRAME_WORDS - 3 + writes)]
+    assert await receiver.send(sealed(request)) == "accepted"
+    assert await receiver.send(sealed([request[0], 2, *request[3:]])) == "wrong_length"
+
+
+@cocotb.test()
+async def every_bit_of_kind_and_session_counts(dut):
+    receiver = await begin(dut)
+    packet = link().request(0, [1, 2])
+    identity, *others = struct.unpack(f"<{len(packet) // 4}I", packet)
+    for bit in range(32):
+        other = sealed([identity ^ 1 << bit, *others[:-1]])
+        assert await receiver.send(other) == "foreign", f"bit {bit}"
+    assert await receiver.send(packet) == "accepted"
+
+
+@cocotb.test()
+async def the_count_of_each_cause_wraps(dut):
+    receiver = await begin(dut)
+    receiver.settings["time_window"] = 100
+    packet = link().request(0, [1, 2])
+    assert await receiver.send(packet) == "accepted"
+    later = link(1)
+    provoked = {
+        "damaged": lambda: receiver.send(b"0"),
+        "foreign": lambda: receiver.send(packet, foreign=1),
+        "wrong_length": lambda: receiver.send(link(1, 1).request(0, [0])),
+        "replayed": lambda: receiver.send(packet),
+        "out_of_time": lambda: receiver.send(later.request(101, [1, 2])),
+        "busy": lambda: receiver.send(later.request(0, [1, 2])),
+    }
+    assert tuple(provoked) == tuple(NAMES)
+    for cause, refusal in provoked.items():
+        receiver.busy = int(cause == "busy")
+        for _ in range(257):
+            assert await refusal() == cause
+        assert receiver.model.counts[cause] == 1
 
 
 @cocotb.test()
