@@ -190,38 +190,66 @@ async def without_the_queue_only_the_position_is_reported(dut):
 
 
 @cocotb.test()
+async def every_bit_of_the_lengths_reaches_compare(dut):
+    bench = await begin(dut)
+    for bit in range(3, 24) if bench.has_compare else ():
+        for long, short in (("pulse_length", "gap_length"), ("gap_length", "pulse_length")):
+            bench.settings = {long: 2 + (1 << bit), short: 1, "compare_start": 1 << bench.zeros}
+            bench.settings["compare_step"] = 1 << bench.zeros
+            await bench.clk(compare_arm=1)
+            await bench.clk(position_valid=1, position=0)
+            await bench.clk(position_valid=1, position=100)
+            seen = [one["compare_pulse"] for one in await bench.idle(10)]
+            assert seen[1:] == [1, *[int(long == "pulse_length")] * 8]
+            await bench.clk(rst=1)
+
+
+@cocotb.test()
 async def any_input_matches_the_models_in_every_cycle(dut):
-    bench, position, probe, by_counts = await begin(dut), 0, 0, 0
-    for cycle in range(3000):
-        if cycle % 300 == 0:
+    bench, position, probe, by_counts, start_at = await begin(dut), 0, 0, 0, 0
+    period = 1 << 16 - bench.zeros  # in steps of 2^ZEROS, as position is
+    for cycle in range(4000):
+        if cycle % 200 == 0:
             by_counts = random.getrandbits(1)
-            here = wrapped(position << bench.zeros)
+            position = random.getrandbits(48 - bench.zeros)
+            start_at = position + random.randrange(-100, 100)
             bench.settings = dict(
-                compare_start=wrapped(here + (random.randrange(-300, 300) << bench.zeros)),
                 compare_step=random.randrange(-50, 50) << bench.zeros,
                 compare_count=random.choice((0, 0, 1, 3, 20)),
                 pulse_length=random.choice((0, 1, 4)),
                 gap_length=random.choice((0, 1, 3)),
                 capture_sources=random.choice((127, random.getrandbits(7))),
             )
-        position = wrapped(position + random.randrange(-20, 22))
+        position += random.randrange(-20, 22)
         probe ^= random.getrandbits(2) if random.random() < 0.05 else 0
         rst = int(random.random() < 0.002)
         often = {name: int(random.random() < 0.3) for name in ("position_valid", "step_made")}
         at_times = ("index_found", "capture_now", "sync", "tick")
         seldom = {name: int(random.random() < 0.04) for name in at_times}
-        rarely = ("capture_clear", "compare_arm", "compare_disarm", "shifted")
+        rarely = {
+            name: int(not rst and random.random() < share)
+            for name, share in {
+                "capture_clear": 0.005,
+                "compare_arm": 0.02,
+                "compare_disarm": 0.002,
+                "shifted": 0.02,
+            }.items()
+        }
+        periods = random.choice((1, -3, random.randrange(-(2**31), 2**31)))
         await bench.clk(
             rst,
             by_counts=by_counts,
             probe=probe,
             position=position,
-            shifted_periods=random.choice((1, -3, random.randrange(-(2**31), 2**31))),
+            compare_start=wrapped(start_at << bench.zeros),
+            shifted_periods=periods,
             capture_next=int(random.random() < 0.1),
             **often,
             **seldom,
-            **{name: int(not rst and random.random() < 0.005) for name in rarely},
+            **rarely,
         )
+        if rarely["shifted"]:  # the position jumps, and the points are set anew as far from it
+            position, start_at = (place + periods * period for place in (position, start_at))
 
 
 @pytest.mark.parametrize(
