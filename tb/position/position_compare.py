@@ -35,7 +35,11 @@ class PositionCompare:
         position=0,
         shift=0,
         shift_periods=0,
+        rst=0,
     ):
+        if rst:
+            self.__init__()
+            return 0, 0, 0, 0
         reached = self.past(self.reach, self.point) >= 0
         due = self.armed and self.ready and reached
         busy = self.pulse or self.resting and self.timer > 1

@@ -57,7 +57,7 @@ class PositionEvents:
         """What COMPARED names."""
         if not self.has_compare:
             return (0,) * len(COMPARED)
-        outputs = self.compare.step(
+        return self.compare.step(
             start=inputs["compare_start"],
             step=inputs["compare_step"],
             count=inputs["compare_count"],
@@ -69,7 +69,5 @@ class PositionEvents:
             position=inputs["position"],
             shift=inputs["shifted"],
             shift_periods=inputs["shifted_periods"],
+            rst=rst,
         )
-        if rst:
-            self.compare, outputs = PositionCompare(), (0,) * len(COMPARED)
-        return outputs
