@@ -393,8 +393,9 @@ def test_a_client_that_ends_in_mid_motion_leaves_its_axis_stopped_and_off(served
 def test_a_drive_stays_on_as_long_as_its_client_is_there(served):
     with served.stream() as client:
         client.request("POST", f"{AXIS}/enable")
-        until = served.far.now() + 2  # the watchdog of the bus has half a second
-        while served.far.now() < until:
+        enabled = served.far.now()
+        for n in range(20):  # 2 s; the watchdog of the bus has half a second
+            served.wait_until(lambda after=n * 0.1: served.far.now() - enabled >= after)
             client.request("GET", "/api")  # which asks no node
         assert served.node.state() == "holding"
 
