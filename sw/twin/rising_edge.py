@@ -11,8 +11,10 @@ to Verilator's evaluation: in the function it is low.
 While the soft core accesses no register, most of the node rests: its registers stay as they are
 until one of its inputs changes. Such an edge evaluates only the other part; and of this part, only
 what is left while the soft core waits, while the motion engine waits for the next tick (both, or
-one of them), and while the axes stand still. Which part works is a list of names; a wrong list
-costs time, but the result is the same.
+one of them), and while the axes stand still. One of these edges has a calm form for cycles at
+which none of some events happens; the compiler leaves out of it what only the events need. Which
+part works, and what is an event, are lists of names; a wrong list costs time, but the result is the
+same.
 
 Everything here works on the text that `verilator --no-decoration` makes; twin/statements.py takes
 it apart.
@@ -30,6 +32,7 @@ from twin.statements import (
     DECLARATION,
     NAME,
     NEVER,
+    NONE,
     ZERO,
     Effect,
     FormError,
@@ -74,6 +77,15 @@ AXES = (
     r"scale_valid|stepped|counted|strobe|step_made_q|passed"
 )
 SINE = r"u_chain__\w+|u_monitor__\w+|u_adc__\w+|u_recorder__\w+|raw_sin|raw_cos"
+# Events: bits that are 0 in most cycles and otherwise have much to be done, as the strobes that go
+# with a value from stage to stage.
+EVENTS = re.compile(
+    r"(?:^|__DOT__)(?:tick|sample_tick|limit_tick|result_valid|arrived|converted|sampled|centred|"
+    r"compared|u_position__DOT__(?:counted|plain_valid)|u_monitor__DOT__(?:measured|judged)|"
+    r"u_chain__DOT__(?:filtered|corrected|straight|tracked)|u_correction__DOT__multiplied|"
+    r"u_harmonics__DOT__(?:read|weighed|multiplied))$"
+)
+HAS_CALM = 3  # number of the edge at which only the engine, or only the way of a sample, works
 ADC = re.compile(r"__DOT__u_adc__")  # in a node with a sine axis
 
 
@@ -379,6 +391,7 @@ class Edges:
     program: Sequence[Statement]
     logic: int  # statements at the beginning that are logic
     active: Sequence[tuple[int, re.Pattern[str]]]  # parent of each edge from 1 on, what changes
+    has_calm: int | None = None  # the edge that has a calm form
     programs: list[list[Statement]] = field(init=False)
     rests: list[Rest] = field(init=False)  # Rest n is what edge n + 1 leaves out of its parent
     logics: list[int] = field(init=False)  # as `logic`, of each program
@@ -455,23 +468,43 @@ class Edges:
         needs = frozenset(name for name in words if array(name) in names)
         return Plain(tuple(lines), Effect(needs, changes=frozenset(["return"])))
 
+    def functions(self, number: int) -> dict[str, Names]:
+        """{function of an edge: events at which it refuses}, in the order in which to try them."""
+        effect = effect_of(self.programs[number])
+        signals = (effect.needs | effect.changes) & set(self.design.types)
+        events = frozenset(filter(EVENTS.search, signals if number == self.has_calm else ()))
+        calm = {f"calm_{number}": events} if events else {}
+        return {**calm, f"edge_{number}": NONE}
+
+    def refusal(self, events: Names) -> Plain:
+        """Refuses if one of the events happens."""
+        line = f"if ({any_of(map(self.now, sorted(events)))}) return false;"
+        return Plain((line,) if events else (), Effect(events, changes=frozenset(["return"])))
+
     def text(self, number: int) -> Iterator[str]:
-        """The function of an edge, which returns false, before it has changed anything, if it
-        refuses.
+        """The functions of an edge, each of which returns false, before it has changed anything, if
+        it refuses.
         """
-        program = self.programs[number]
+        for name, events in self.functions(number).items():
+            yield from self.function(number, name, events)
+
+    def function(self, number: int, name: str, events: Names) -> Iterator[str]:
+        """One function of an edge."""
+        program, logic = self.programs[number], self.logics[number]
         computed = {array(name) for name in effect_of(program).changes}
+        late = events & effect_of(program[:logic]).changes
         # inlined where they are called, GCC makes code of them that takes 1.5 times as long
         yield "__attribute__((noinline))"
-        yield f"static bool edge_{number}({ROOT}& vlSelfRef, Rest& rest) {{"
+        yield f"static bool {name}({ROOT}& vlSelfRef, Rest& rest) {{"
+        yield from self.refusal(events - late).lines()
         for n in self.left_out(number):
             names = self.rests[n].inputs & set(self.before(n)) & (computed | self.design.pins)
             differ = self.changed(sorted(names), f"before_{n}_@")
             yield f"if ({differ}) return false;"
         state = {array(name) for name in effect_of(self.program).needs}
         kept = state | self.design.outputs | self.results
-        logic = self.logics[number]
-        program = [*program[:logic], self.after_logic(number), *program[logic:]]
+        checks = [self.refusal(late), self.after_logic(number)]
+        program = [*program[:logic], *checks, *program[logic:]]
         text = text_of(self.design, program, kept, self.stored)
         for n in self.left_out(number):
             text = flagged(text, self.arrays & self.rests[n].inputs, f"rest.known_{n} = false;")
@@ -505,7 +538,12 @@ class Edges:
         number = self.active[min(may_rest)][0]
         for n, condition in may_rest.items():
             yield from (f"if ({condition}) {{", *self.observed(n), "} else")
-        yield f"if (edge_{number}(vlSelfRef, rest)) return;"
+        yield from ("{", *self.evaluated(number), "}")
+
+    def evaluated(self, number: int) -> Iterator[str]:
+        """Statements that evaluate an edge by the first of its functions that does not refuse."""
+        for name in self.functions(number):
+            yield f"if ({name}(vlSelfRef, rest)) return;"
 
 
 def has_engine(design: Design) -> bool:
@@ -536,7 +574,7 @@ def choice(edges: Edges, waits: str, accesses: str) -> Iterator[str]:
     last = apart = len(edges.rests) - engine  # edge; the Rest that the edge after it leaves out
     if engine:
         yield from (f"const bool apart = rest.known_{apart};", f"rest.known_{apart} = false;")
-    yield f"if ({edges.known(last)} && edge_{last}(vlSelfRef, rest)) return;"
+    yield from (f"if ({edges.known(last)}) {{", *edges.evaluated(last), "}")
     for number in reversed(range(2, last)):
         yield from (f"rest.known_{number} = false;", f"if ({edges.known(number)}) {{")
         quiet = number == last - 1 and engine
@@ -568,7 +606,7 @@ def function(design: Design) -> str:
     waits, accesses = (NEVER, ALWAYS) if has_flash else (WAITS, ACCESSES)
     if missing := set(re.findall(r"node__\w+", waits)) - set(design.types):
         raise FormError(f"there is no {', '.join(sorted(missing))}")
-    edges = Edges(design, program, len(logic), tree_of(design))
+    edges = Edges(design, program, len(logic), tree_of(design), HAS_CALM)
     lines = ["struct Rest {", *edges.members(), "};"]
     for number in range(len(edges.programs)):
         lines += edges.text(number)

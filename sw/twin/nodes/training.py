@@ -15,7 +15,7 @@ from twin.machines.machine import declare, pack
 from twin.nodes.library import FUNCTIONS
 from twin.nodes.twin import BAUD
 
-CYCLES = 1_200_000  # the soft core waits from 900 000 on
+CYCLES = 2_400_000  # the soft core waits from 1 030 000 on
 ASK_CYCLES = 100_000  # from one question of the host to the next
 QUESTION = [0x111]  # to node 1: send your last reply
 MACHINE = "stage"
