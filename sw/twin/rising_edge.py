@@ -442,7 +442,8 @@ class Edges:
             yield f"{self.types[name]} {name};"
         for n, rest in enumerate(self.rests):
             yield f"bool known_{n} = false;"  # nothing but the inputs can change what rests
-            yield f"bool written_{n} = false;"  # a memory of what rests was written
+            yield f"bool held_{n} = false;"  # it was known, and all below is as it was
+            yield f"bool written_{n} = false;"  # a memory that it has or reads was written
             yield from (f"decltype({ROOT}::{name}) before_{n}_{name};" for name in self.before(n))
             inputs = sorted(rest.logic_inputs)
             yield from (f"{self.types[name]} input_{n}_{name};" for name in inputs)
@@ -463,7 +464,8 @@ class Edges:
         for n in self.rests_of(number):
             inputs = self.rests[n].logic_inputs
             names |= inputs
-            lines += [f"rest.input_{n}_{name} = {self.now(name)};" for name in sorted(inputs)]
+            stores = [f"rest.input_{n}_{name} = {self.now(name)};" for name in sorted(inputs)]
+            lines += [f"if (!rest.held_{n}) {{", *stores, "}"] if stores else []
         words = {name for s in self.programs[number] for name in s.effect.changes}
         needs = frozenset(name for name in words if array(name) in names)
         return Plain(tuple(lines), Effect(needs, changes=frozenset(["return"])))
@@ -486,9 +488,9 @@ class Edges:
         it refuses.
         """
         for name, events in self.functions(number).items():
-            yield from self.function(number, name, events)
+            yield from self.function_text(number, name, events)
 
-    def function(self, number: int, name: str, events: Names) -> Iterator[str]:
+    def function_text(self, number: int, name: str, events: Names) -> Iterator[str]:
         """One function of an edge."""
         program, logic = self.programs[number], self.logics[number]
         computed = {array(name) for name in effect_of(program).changes}
@@ -509,7 +511,7 @@ class Edges:
         for n in self.left_out(number):
             text = flagged(text, self.arrays & self.rests[n].inputs, f"rest.known_{n} = false;")
         for n in self.rests_of(number):
-            writes = self.arrays & set(self.rests[n].changes(False))
+            writes = self.arrays & (set(self.rests[n].changes(False)) | self.rests[n].inputs)
             text = flagged(text, writes, f"rest.written_{n} = true;")
         yield from (text, "return true;", "}")
 
@@ -519,15 +521,21 @@ class Edges:
 
     def observed(self, n: int) -> Iterator[str]:
         """Statements that evaluate the parent of Rest n and find out whether it may rest from the
-        next edge on.
+        next edge on. If only an input has changed, and this has changed nothing of what rests, it
+        may rest again as soon as the input is as before.
         """
         number = self.active[n][0]
-        yield f"rest.written_{n} = false;"
         before = self.before(n)
+        own = [name for name in before if name in self.rests[n].changes(False)]
+        others = [name for name in before if name not in own]
+        yield f"rest.written_{n} = false;"
+        yield f"if (!rest.held_{n}) {{"
         yield from (f"rest.before_{n}_{name} = vlSelfRef.{name};" for name in before)
+        yield "}"
         yield f"if (edge_{number}(vlSelfRef, rest)) {{"
-        differ = self.changed(before, f"before_{n}_@")
-        yield f"rest.known_{n} = !(rest.written_{n} | {differ});"
+        yield f"const bool as_before = !(rest.written_{n} | {self.changed(own, f'before_{n}_@')});"
+        inputs = self.changed(others, f"before_{n}_@")
+        yield f"rest.known_{n} = as_before && (rest.held_{n} || !({inputs}));"
         yield "return;"
         yield "}"
 
@@ -576,10 +584,11 @@ def choice(edges: Edges, waits: str, accesses: str) -> Iterator[str]:
         yield from (f"const bool apart = rest.known_{apart};", f"rest.known_{apart} = false;")
     yield from (f"if ({edges.known(last)}) {{", *edges.evaluated(last), "}")
     for number in reversed(range(2, last)):
+        yield f"rest.held_{number} = rest.known_{number};"
         yield from (f"rest.known_{number} = false;", f"if ({edges.known(number)}) {{")
         quiet = number == last - 1 and engine
         yield from edges.chosen({number: rests}) if quiet else edges.observed(number)
-        yield "}"
+        yield from ("}", f"rest.held_{number} = false;")
     yield "rest.known_1 = false;"
     # an access wakes what rests
     yield from (f"if (({accesses}) & !({waits})) {{", "rest.known_0 = false;")

@@ -125,6 +125,27 @@ def test_an_edge_refuses_if_an_input_of_what_it_leaves_out_has_changed():
     assert "if ((x != rest.input_0_x)) return false;" in part and "b = x" not in part
 
 
+def test_a_memory_that_rests_or_is_read_by_what_rests_sets_the_flag():
+    lines = ("c = m[b];", "e[b] = e[a];", "m[now] = a;", "now = a;")
+    split = edges(*lines, logic=0, active=["now"], now=WORD, b=WORD, c=WORD)
+    assert split.rests[0].works == {2, 3} and split.arrays == {"e", "m"}
+    whole = list(split.text(0))[-3].splitlines()
+    for line in ("e[b] = e[a];", "m[now] = a;"):
+        assert whole[whole.index(line) + 1] == "rest.written_0 = true;"
+
+
+def test_what_only_an_input_woke_may_rest_again_with_the_input_as_before():
+    """The copies stay while it is held, and so do the inputs that are logic."""
+    lines = ("x = now;", "now = a;", "b = (x ^ b);")
+    split = edges(*lines, logic=1, active=["now"], now=WORD, b=WORD, x=BIT)
+    observed = list(split.observed(0))
+    copies = observed.index("rest.before_0_b = vlSelfRef.b;")
+    assert observed[copies - 1 : copies + 2 : 2] == ["if (!rest.held_0) {", "}"]
+    assert "rest.known_0 = as_before && (rest.held_0 || !(0));" in observed
+    whole = "\n".join(split.text(0))
+    assert "if (!rest.held_0) {\nrest.input_0_x = x;\n}" in whole
+
+
 def test_a_calm_form_refuses_at_events_of_registers_at_once_and_of_logic_behind_it():
     lines = ("arrived = a;", "b = arrived;", "c = tick;")
     types = {name: BIT for name in ("arrived", "tick", "b", "c")}
