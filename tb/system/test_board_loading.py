@@ -322,9 +322,9 @@ def test_the_analog_part_of_a_placed_pll_equals_that_of_attributes_of_the_instan
             cells = FAMILIES["ecp5"].read_cells
             found = synthesis.yosys(source, {}, last, f"pll-{source.parent.name}", cells)
             part = ["--25k", "--package", "CABGA381", "--lpf-allow-unconstrained"]
-            placed = synthesis.NEXTPNR_ECP5, part, 25, 1, "--textcfg", source.with_name("placed")
-            synthesis.placed(found, *placed)
-            return source.with_name("placed").read_text()
+            written = found.with_name("placed")
+            synthesis.placed(found, synthesis.NEXTPNR_ECP5, part, 25, 1, "--textcfg", written)
+            return written.read_text()
 
     told = ", ".join(f'{name} = "{value}"' for name, value in clocks.ECP5_ANALOG.items())
     with_zeros = config('FREQUENCY_PIN_CLKI = "25.0"')
