@@ -472,11 +472,13 @@ class Edges:
 
     def functions(self, number: int) -> dict[str, Names]:
         """{function of an edge: events at which it refuses}, in the order in which to try them."""
+        whole = {f"edge_{number}": NONE}
+        if number != self.has_calm:
+            return whole
         effect = effect_of(self.programs[number])
         signals = (effect.needs | effect.changes) & set(self.design.types)
-        events = frozenset(filter(EVENTS.search, signals if number == self.has_calm else ()))
-        calm = {f"calm_{number}": events} if events else {}
-        return {**calm, f"edge_{number}": NONE}
+        events = frozenset(filter(EVENTS.search, signals))
+        return {f"calm_{number}": events, **whole} if events else whole
 
     def refusal(self, events: Names) -> Plain:
         """Refuses if one of the events happens."""
@@ -526,8 +528,9 @@ class Edges:
         """
         number = self.active[n][0]
         before = self.before(n)
-        own = [name for name in before if name in self.rests[n].changes(False)]
-        others = [name for name in before if name not in own]
+        rests = self.rests[n].changes(False)
+        own = [name for name in before if name in rests]
+        others = [name for name in before if name not in rests]
         yield f"rest.written_{n} = false;"
         yield f"if (!rest.held_{n}) {{"
         yield from (f"rest.before_{n}_{name} = vlSelfRef.{name};" for name in before)

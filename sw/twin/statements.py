@@ -166,7 +166,7 @@ class Parser:
         needs = self.names(value)
         if not index or (name in self.words and re.fullmatch(r"\[\d+U\]", index)):
             target = self.names(name + index)
-            return of_zero(line, Plain((line,), Effect(needs, target, target)))
+            return of_zero(Plain((line,), Effect(needs, target, target)))
         target = self.names(name)
         return Plain((line,), Effect(needs | self.names(index) | target, NONE, target))
 
@@ -213,20 +213,19 @@ class Parser:
         return Plain(text, Effect(names, NONE, names))
 
 
-def of_zero(line: str, assignment: Plain) -> Statement:
-    """An assignment, whose line it is; or a choice, if it reads one signal and nothing else, but
-    that often, as the encoder of a priority does. The compiler makes a constant of the branch in
-    which the signal is 0.
+def of_zero(assignment: Plain) -> Statement:
+    """An assignment of one line; or a choice, if it reads one signal and nothing else, but that
+    often, as the encoder of a priority does. The compiler makes a constant of the branch in which
+    the signal is 0.
     """
-    reads = re.findall(r"\(IData\)\((?:vlSelfRef\.)?(\w+)\)", line)
-    signals = assignment.effect.needs
-    if len(reads) < OFTEN or len(signals) != 1 or len(NAME.findall(line)) != 1 + len(reads):
+    (line,) = assignment.text
+    reads = re.findall(r"\(IData\)\(((?:vlSelfRef\.)?\w+)\)", line)
+    if len(reads) < OFTEN or len(set(reads)) > 1 or len(NAME.findall(line)) != 1 + len(reads):
         return assignment
-    (signal,) = signals
-    read = next(m[0] for m in re.finditer(rf"(?:vlSelfRef\.)?\b{signal}\b", line))
-    zero = line.replace(f"(IData)({read})", "(IData)(0U)")
-    constant = Plain((zero,), Effect(NONE, *[assignment.effect.sets] * 2))
-    return Choice(f"0U != {read}", signals, (assignment,), (constant,))
+    effect = assignment.effect
+    zero = line.replace(f"(IData)({reads[0]})", "(IData)(0U)")
+    constant = Plain((zero,), Effect(NONE, effect.sets, effect.changes))
+    return Choice(f"0U != {reads[0]}", effect.needs, (assignment,), (constant,))
 
 
 def array(name: str) -> str:

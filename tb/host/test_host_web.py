@@ -394,7 +394,7 @@ def test_a_drive_stays_on_as_long_as_its_client_is_there(served):
     with served.stream() as client:
         client.request("POST", f"{AXIS}/enable")
         enabled = served.far.now()
-        for n in range(20):  # 2 s; the watchdog of the bus has half a second
+        for n in range(21):  # 2 s; the watchdog of the bus has half a second
             served.wait_until(lambda after=n * 0.1: served.far.now() - enabled >= after)
             client.request("GET", "/api")  # which asks no node
         assert served.node.state() == "holding"
