@@ -7,14 +7,17 @@ import random
 import re
 import subprocess
 import tempfile
+from collections import deque
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy
 
-from figures.common import Absent, Figure, Quick, console
+from figures.common import Absent, Figure, Quick, bar, console, shares
 from linuxcnc_config.headless import RULES, SOURCES, missing, run
 from linuxcnc_config.programs import (
     PROGRAMS,
@@ -44,9 +47,16 @@ PARTS = ("axis", "carrier", "encoder", "latch", "node", "node_clock", "packet", 
 OPTIONS = ("-O2", "-std=gnu11", "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-Drealtime")
 MEDIAN_US = 10.0
 PERIODS = 100_000
-HOMINGS, LOST = 10**4, 0.01
+HOMINGS, HOMINGS_A_MILL, LOST = 10**4, 300, 0.01
+PROCESSES = 2
+REST_PERIODS = 5  # more than a packet is old that the driver has, with some lost
 BELOW_M = {"travel_start_lowest": -1.5e-3, "travel_start_highest": -0.5e-3}  # the index
-UPWARD: Mapping[str, Value] = {"home_method": 34, "home_distance": "2mm"}
+UPWARD: Mapping[str, Value] = {
+    "home_method": 34,
+    "home_distance": "2mm",
+    "homing_search_speed": "10mm/s",
+    "settle_time": "5ms",
+}
 TOLERANCE_MM = 0.02  # of a path, beyond which a program counts as failed
 TOUCH_MM = 0.002  # of a touched point from the surface
 PITCH_MM = 0.003  # error of a pitch, and of a pass from the groove of the first one
@@ -144,27 +154,29 @@ class Losses:
     def __init__(self, line: TwinMachine, seed: int) -> None:
         self.line, self.random = line, random.Random(seed)
         self.share, self.lost = 0.0, 0
-        self.counts: list[list[int]] = [[], []]  # of the scales, at the end of the last periods
+        self.counts: list[int] = []  # of the scales, at the end of the last period
+        self.changes: deque[list[int]] = deque(maxlen=REST_PERIODS)  # how often they have changed
 
     def exchange(self, data: bytes, seconds: float) -> bytes:
         """A period of the machine."""
         loses = self.random.random() < self.share
         self.lost += loses
         reply = self.line.exchange(b"" if loses and self.random.random() < 0.5 else data, seconds)
-        axes = range(self.line.axes)
-        self.counts = [self.counts[1], [self.line.twin.truth(n).scale_counts for n in axes]]
+        truths = [self.line.twin.truth(n) for n in range(self.line.axes)]
+        self.counts = [truth.scale_counts for truth in truths]
+        self.changes.append([truth.scale_changes for truth in truths])
         return sealed(b"?") if loses else reply
 
     def rests(self) -> bool:
-        """Whether no scale has moved in the last period."""
-        return self.counts[0] == self.counts[1]
+        """Whether no scale has moved since before the packet that the driver has read last."""
+        return all(changes == self.changes[-1] for changes in self.changes)
 
 
-def index_home_wrong(homings: int = HOMINGS, seed: int = 1) -> float:
-    """The first homing has all packets; each further one must find the same counts for the same
-    position.
+def homed(program: Path, homings: int, seed: int) -> tuple[int, int]:
+    """Packets lost, and wrong counts, of so many homings of a mill, after its first one, which has
+    all packets: each finds the same counts for the same position. In a process of its own: a fork
+    would inherit the progress bar's thread.
     """
-    program = bench("homing_bench")
     axis = replace(MILL.axis, parameters=MILL.axis.parameters | BELOW_M)
     plant = replace(MILL, axis=axis, settings={**MILL.settings, **UPWARD}, surface=None)
     with TwinMachine(plant, seed) as mill:
@@ -182,16 +194,30 @@ def index_home_wrong(homings: int = HOMINGS, seed: int = 1) -> float:
                     raise MoireError(f"the driver did not home: {answer.strip()}")
                 rests = losses.rests()
                 if rests:
-                    pairs = zip(map(int, answer.split()), losses.counts[1], strict=True)
+                    pairs = zip(map(int, answer.split()), losses.counts, strict=True)
                     found = [counts - true for counts, true in pairs]
                     first = first or found
                     wrong += sum(one != other for one, other in zip(found, first, strict=True))
                     losses.share, left = LOST, left - 1
+                    mill.path.clear()
                 if left:
                     process.stdin.write("home\n" if rests else "again\n")
                     process.stdin.flush()
             process.stdin.close()
-    console.print(f"{losses.lost} packets lost in {homings} homings, {wrong} counts wrong")
+    return losses.lost, wrong
+
+
+def index_home_wrong(homings: int = HOMINGS, seed: int = 1) -> float:
+    """Some hundred homings a mill, each mill with another start and other losses."""
+    program, lost, wrong = bench("homing_bench"), 0, 0
+    sizes, starts = zip(*shares(homings, HOMINGS_A_MILL, seed), strict=True)
+    run = partial(homed, program)
+    with bar("homings") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        task = progress.add_task("", total=homings)
+        for size, found in zip(sizes, pool.map(run, sizes, starts), strict=True):
+            lost, wrong = lost + found[0], wrong + found[1]
+            progress.advance(task, size)
+    console.print(f"{lost} packets lost in {homings} homings, {wrong} counts wrong")
     return wrong
 
 

@@ -10,7 +10,7 @@
 #include "bench_hal.h"
 #include "moire.c"
 
-static const double AWAY_MM = -0.3, AWAY_S = 0.2, SETTLED_S = 0.1, PATIENCE_HOMING_S = 60;
+static const double AWAY_MM = -0.1, AWAY_S = 0.06, SETTLED_S = 0.02, PATIENCE_HOMING_S = 60;
 static const double PI = 3.14159265358979323846;
 
 static long period_ns;

@@ -68,13 +68,17 @@ COUNTERS = (
 SOFT_CORE = r"u_core__\w+"
 LINE = (
     r"u_receiver__\w+|u_transmitter__DOT__(?:part|u_timer__\w+)|u_break__DOT__low|"
-    r"u_timeout__DOT__spent"
+    r"u_timeout__DOT__spent|u_link__\w+|u_arbiter__DOT__g_several__DOT__left"
 )
 SELDOM = re.compile(r"__DOT__master_(?:address|wdata)$")  # they are 0 but for an access of the core
 ENGINE = r"u_engine__DOT__(?!u_settings)\w+|result|result_\w+"
 AXES = (
     r"u_position__\w+|u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|plain_phase|age|due|"
     r"scale_valid|stepped|counted|strobe|step_made_q|passed"
+)
+MOVES = (
+    r"u_steps__DOT__(?:ahead|quarter|acted|since|\w+_age)|own_step|u_inputs__DOT__u_pins__DOT__stages|"
+    r"u_feedback__DOT__(?:levels|quadrature_step|u_encoder__\w+)|quadrature_count"
 )
 SINE = r"u_chain__\w+|u_monitor__\w+|u_adc__\w+|u_recorder__\w+|raw_sin|raw_cos"
 # Events: bits that are 0 in most cycles and otherwise have much to be done, as the strobes that go
@@ -569,7 +573,7 @@ def tree_of(design: Design) -> list[tuple[int, re.Pattern[str]]]:
     """
     sine = any(ADC.search(name) for name in design.types)
     moves = (AXES, SINE) if sine else (AXES,)
-    chain = [works(SOFT_CORE, LINE, ENGINE, *moves), works(ENGINE, *moves)]
+    chain = [works(SOFT_CORE, LINE, ENGINE, *moves, MOVES), works(ENGINE, *moves)]
     chain += [works(*moves)] if sine else [works(ENGINE), works()]
     if not has_engine(design):
         return list(enumerate(chain[:-1]))
