@@ -76,6 +76,8 @@ AXES = (
     r"u_position__\w+|u_compare__DOT__(?:timer|reach|arrived)|u_filter__\w+|plain_phase|age|due|"
     r"scale_valid|stepped|counted|strobe|step_made_q|passed"
 )
+# Pins of encoders and steps, and what follows them. They would make each edge slower that has
+# them, so they work only where the soft core does, which has much to do while axes move.
 MOVES = (
     r"u_steps__DOT__(?:ahead|quarter|acted|since|\w+_age)|own_step|u_inputs__DOT__u_pins__DOT__stages|"
     r"u_feedback__DOT__(?:levels|quadrature_step|u_encoder__\w+)|quadrature_count"
