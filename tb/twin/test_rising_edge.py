@@ -13,7 +13,7 @@ import pytest
 from experiments import s2_stage
 from tb.twin.test_statements import parsed, text_of
 from twin import build, rising_edge, statements
-from twin.nodes.twin import NODE
+from twin.nodes.twin import ALL_AXES, NODE
 
 
 def design(logic, *lines):
@@ -242,16 +242,24 @@ def signals(folder: Path) -> str:
 WAITS_FROM = 900_000  # cycles for each axis; then the soft core waits most of the time
 
 
+STREAM = {**s2_stage.NODE, "HAS_BACKLASH": ALL_AXES, "HAS_SET_POINTS": ALL_AXES, "HAS_LINK": 1}
+
+
 @pytest.mark.parametrize(
-    "node, axes, clk_hz, cycles",
-    [(NODE, 1, 2_400_000, 1_600_000), (s2_stage.NODE, 2, 12_000_000, 2_600_000)],
+    "node, image, axes, clk_hz, cycles",
+    [
+        (NODE, "axis", 1, 2_400_000, 1_600_000),
+        (STREAM, "steps_stream", 2, 12_000_000, 2_600_000),
+    ],
 )
-def test_a_node_does_the_same_as_by_verilator_in_each_cycle(tmp_path, node, axes, clk_hz, cycles):
+def test_a_node_does_the_same_as_by_verilator_in_each_cycle(
+    tmp_path, node, image, axes, clk_hz, cycles
+):
     tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
     build.verilate_node(tmp_path, verilator, clk_hz, axes, node)
     assert "static bool calm_3(" in (tmp_path / "verilated_node.h").read_text()
     (tmp_path / "signals.h").write_text(signals(tmp_path))
-    (tmp_path / "firmware").write_text("\n".join(f"{w:x}" for w in build.firmware(axes=axes)))
+    (tmp_path / "firmware").write_text("\n".join(f"{w:x}" for w in build.firmware(image, axes)))
     flags = [*build.compile_flags(), *build.VERILATED]
     include = [f"-I{tmp_path}", f"-I{build.HERE}", f"-I{verilator / 'include'}"]
     driver = Path(__file__).with_name("rising_edge_run.cpp")
