@@ -9,11 +9,13 @@ import inspect
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -32,6 +34,8 @@ TOOLS = {  # modules here that measure nothing
     "synthesis",
 }
 COMPARISONS = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
+PROCESSES = 2  # of long work in Python
+Found = TypeVar("Found")
 console = Console(stderr=True)  # facts and progress; the figure itself goes to standard output
 
 
@@ -113,6 +117,20 @@ def bar(text: str) -> Progress:
     return Progress(
         TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console
     )
+
+
+def in_processes(
+    text: str, run: Callable[..., Found], sizes: Sequence[int], *arguments: Iterable[Any]
+) -> Iterator[Found]:
+    """What `run` returns for each of the arguments, as with `map`, on PROCESSES processes and with
+    a bar, which advances by one of the sizes each. The processes are spawned: a fork would inherit
+    the bar's thread.
+    """
+    with bar(text) as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        task = progress.add_task("", total=sum(sizes))
+        for size, found in zip(sizes, pool.map(run, *arguments), strict=True):
+            progress.advance(task, size)
+            yield found
 
 
 def modules() -> list[str]:

@@ -9,15 +9,13 @@ import subprocess
 import tempfile
 from collections import deque
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy
 
-from figures.common import Absent, Figure, Quick, bar, console, shares
+from figures.common import Absent, Figure, Quick, console, in_processes, shares
 from linuxcnc_config.headless import RULES, SOURCES, missing, run
 from linuxcnc_config.programs import (
     PROGRAMS,
@@ -48,7 +46,6 @@ OPTIONS = ("-O2", "-std=gnu11", "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-Drealt
 MEDIAN_US = 10.0
 PERIODS = 100_000
 HOMINGS, HOMINGS_A_MILL, LOST = 10**4, 300, 0.01
-PROCESSES = 2
 REST_PERIODS = 5  # more than a packet is old that the driver has, with some lost
 BELOW_M = {"travel_start_lowest": -1.5e-3, "travel_start_highest": -0.5e-3}  # the index
 UPWARD: Mapping[str, Value] = {
@@ -174,8 +171,7 @@ class Losses:
 
 def homed(program: Path, homings: int, seed: int) -> tuple[int, int]:
     """Packets lost, and wrong counts, of so many homings of a mill, after its first one, which has
-    all packets: each finds the same counts for the same position. In a process of its own: a fork
-    would inherit the progress bar's thread.
+    all packets: each finds the same counts for the same position.
     """
     axis = replace(MILL.axis, parameters=MILL.axis.parameters | BELOW_M)
     plant = replace(MILL, axis=axis, settings={**MILL.settings, **UPWARD}, surface=None)
@@ -211,12 +207,8 @@ def index_home_wrong(homings: int = HOMINGS, seed: int = 1) -> float:
     """Some hundred homings a mill, each mill with another start and other losses."""
     program, lost, wrong = bench("homing_bench"), 0, 0
     sizes, starts = zip(*shares(homings, HOMINGS_A_MILL, seed), strict=True)
-    run = partial(homed, program)
-    with bar("homings") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
-        task = progress.add_task("", total=homings)
-        for size, found in zip(sizes, pool.map(run, sizes, starts), strict=True):
-            lost, wrong = lost + found[0], wrong + found[1]
-            progress.advance(task, size)
+    for found in in_processes("homings", partial(homed, program), sizes, sizes, starts):
+        lost, wrong = lost + found[0], wrong + found[1]
     console.print(f"{lost} packets lost in {homings} homings, {wrong} counts wrong")
     return wrong
 

@@ -3,39 +3,32 @@
 
 import math
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 from campaigns.campaign import Campaign, Counts
 from experiments import s3_zero
-from figures.common import Figure, Quick, bar, console, seeds, shares
+from figures.common import PROCESSES, Figure, Quick, bar, console, in_processes, seeds, shares
 from moire.client.index_survey import PASSES
 from twin import build
 
 SEARCHES_A_POWER_UP = 10
 WARNED_PCT = 5  # of the motors; a survey that always warned would be of no use
-PROCESSES = 2
 
 
-def searched(
-    seed: int,
-) -> list[
-    s3_zero.Search
-]:  # in a process of its own: a fork would inherit the progress bar's thread
+def searched(seed: int) -> list[s3_zero.Search]:
     return s3_zero.searches(SEARCHES_A_POWER_UP, seed)
 
 
 def s3_zero_um_max(count: int = 1000, seed: int = 1) -> float:
     """A power-up every ten searches, with another start, other noise, and counts from anywhere."""
     s3_zero.Motor(1)  # builds the twin once
-    made = []
-    with bar("searches") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
-        task = progress.add_task("", total=count)
-        for some in pool.map(searched, seeds(seed, count // SEARCHES_A_POWER_UP)):
-            made += some
-            progress.advance(task, len(some))
+    power_ups = seeds(seed, count // SEARCHES_A_POWER_UP)
+    sizes = [SEARCHES_A_POWER_UP] * len(power_ups)
+    made = [
+        search for some in in_processes("searches", searched, sizes, power_ups) for search in some
+    ]
     times = sorted(search.time_s for search in made)
     starts = [search.start_um for search in made]
     above = sum(start > 0 for start in starts)
@@ -64,13 +57,10 @@ def s3_zero_any_mark(
     s3_zero.Motor(1)  # builds the twin once
     survey = partial(s3_zero.surveyed, count=searches, passes=passes)
     made = []
-    with bar("motors") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
-        task = progress.add_task("", total=motors)
-        for motor in pool.map(survey, seeds(seed, motors)):
-            made.append(motor)
-            progress.advance(task)
-            if motor.warned or motor.different:
-                console.print(f"{motor}")
+    for motor in in_processes("motors", survey, [1] * motors, seeds(seed, motors)):
+        made.append(motor)
+        if motor.warned or motor.different:
+            console.print(f"{motor}")
     warned = [motor for motor in made if motor.warned]
     margins = [motor.survey.margin_nm for motor in made if motor.survey]
     gates = Counter(motor.survey.gate for motor in made if motor.survey)

@@ -78,7 +78,7 @@ AXES = (
 )
 # Pins of encoders and steps, and what follows them. They would make each edge slower that has
 # them, so they work only where the soft core does, which has much to do while axes move.
-MOVES = (
+PINS = (
     r"u_steps__DOT__(?:ahead|quarter|acted|since|\w+_age)|own_step|u_inputs__DOT__u_pins__DOT__stages|"
     r"u_feedback__DOT__(?:levels|quadrature_step|u_encoder__\w+)|quadrature_count"
 )
@@ -575,7 +575,7 @@ def tree_of(design: Design) -> list[tuple[int, re.Pattern[str]]]:
     """
     sine = any(ADC.search(name) for name in design.types)
     moves = (AXES, SINE) if sine else (AXES,)
-    chain = [works(SOFT_CORE, LINE, ENGINE, *moves, MOVES), works(ENGINE, *moves)]
+    chain = [works(SOFT_CORE, LINE, ENGINE, *moves, PINS), works(ENGINE, *moves)]
     chain += [works(*moves)] if sine else [works(ENGINE), works()]
     if not has_engine(design):
         return list(enumerate(chain[:-1]))
