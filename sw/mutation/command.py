@@ -56,7 +56,7 @@ def run(
             continue
         entry = entry_of(verdicts, options.count, options.seed)
         survivors = entry["survivors"]
-        assert not isinstance(survivors, int)
+        assert isinstance(survivors, list)
         print(f"{name}: {verdicts.words}", flush=True)
         for survivor in survivors:
             print(f"  {survivor}", flush=True)

@@ -1,29 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/mutants.toml: which mutants have been run, and what no test sees."""
+"""docs/mutants.toml and docs/wiring.toml: which mutants have been run, and what no test sees."""
 
 import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from datetime import date
+from pathlib import Path
+from typing import Any
 
 from twin.build import ROOT
 
-RECORD = ROOT / "docs" / "mutants.toml"
-HEAD = """\
+MUTANTS = ROOT / "docs" / "mutants.toml"  # of blocks and sources
+WIRING = ROOT / "docs" / "wiring.toml"  # of the instances of the block diagrams
+HEADS = {
+    MUTANTS: """\
 # SPDX-License-Identifier: Apache-2.0
 # Which mutants of which blocks and sources have been run, and what no test sees. Written by
 # `python -m mutation.blocks --record`, and the same with `mutation.host` and `mutation.firmware`;
 # docs/mutation.md says how to read it.
-"""
-Entry = Mapping[str, int | Sequence[str]]
+""",
+    WIRING: """\
+# SPDX-License-Identifier: Apache-2.0
+# The faults in the connections of which instances have been run, and which of them no test sees.
+# Written by `make figure NAME=wiring_survivors` and `python -m mutation.wiring --record`;
+# docs/wiring.md says how to read it.
+""",
+}
+Entry = Mapping[str, int | str | Sequence[str]]
 
 
-def add(name: str, entry: Entry) -> None:
-    """Add the entry of a block or module, with today's date, in place of an older one."""
-    known = tomllib.loads(RECORD.read_text()) if RECORD.exists() else {}
+def read(path: Path) -> dict[str, dict[str, Any]]:
+    """The entries of a record, by the names of blocks, modules or instances."""
+    return tomllib.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def add(name: str, entry: Entry, path: Path = MUTANTS) -> None:
+    """Add the entry of a block, module or instance, with today's date, in place of an older one."""
+    known = read(path)
     known[name] = {"date": date.today(), **entry}
-    lines = [HEAD]
+    lines = [HEADS[path]]
     for key, values in sorted(known.items()):
         lines.append(f"[{key}]" if re.fullmatch(r"\w+", key) else f'["{key}"]')
         for what, value in values.items():
@@ -31,6 +47,7 @@ def add(name: str, entry: Entry) -> None:
                 inside = "".join(f"    {json.dumps(text, ensure_ascii=False)},\n" for text in value)
                 lines.append(f"{what} = [\n{inside}]" if value else f"{what} = []")
             else:
-                lines.append(f"{what} = {value}")
+                said = json.dumps(value) if isinstance(value, str) else value
+                lines.append(f"{what} = {said}")
         lines.append("")
-    RECORD.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
+    path.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")

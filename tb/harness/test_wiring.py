@@ -8,7 +8,7 @@ import re
 
 import pytest
 
-from mutation import wiring
+from mutation import record, wiring
 from mutation.connections import RTL, diagrams, of_diagram
 from mutation.library import Bench, library
 from mutation.mutants import KINDS, Design, pairs, same_faults, unheard
@@ -152,3 +152,72 @@ def test_small_diagrams_of_a_design_share_a_build(monkeypatch):
     groups = wiring.together(RTL / name for name in sizes)
     shared = [["node.sv", "axis.sv"], ["motion.sv"], ["relay.sv", "relay_bridge.sv"]]
     assert [[file.name for file in group] for group in groups] == shared
+
+
+@pytest.fixture
+def wiring_record(tmp_path, monkeypatch):
+    """A record of its own, and the mutants that were run since; `blind` are those no test sees."""
+    ran, blind = [], set()
+
+    def campaign(design, mutants, top, jobs):
+        for mutant in mutants:
+            ran.append(mutant.name)
+            yield mutant, "" if mutant.name in blind else "a_test"
+
+    path = tmp_path / "wiring.toml"
+    monkeypatch.setattr(record, "WIRING", path)
+    monkeypatch.setitem(record.HEADS, path, "# a record\n")
+    monkeypatch.setattr(wiring, "campaign", campaign)
+    monkeypatch.setattr(wiring, "diagrams", lambda: (DISPLAY,))
+    forget = wiring.instances.cache_clear
+    forget()
+    yield ran, blind
+    forget()
+
+
+def test_an_instance_in_the_record_runs_again_only_if_its_connections_have_changed(
+    wiring_record, monkeypatch
+):
+    ran, _ = wiring_record
+    assert len(dict(wiring.recorded([DISPLAY]))) == len(wiring.instances()) == 2
+    assert len(ran) == sum(entry["found"] for entry in wiring.known().values()) > 20
+    ran.clear()
+    assert not dict(wiring.recorded([DISPLAY])) and not ran
+    changed = dict(wiring.instances())
+    (_, instance) = place = min(changed)
+    changed[place] = "other"
+    monkeypatch.setattr(wiring, "instances", lambda: changed)
+    assert [place for place, _ in wiring.recorded([DISPLAY])] == [place]
+    assert ran and all(f": {instance}." in name for name in ran)
+
+
+def test_an_interrupted_run_goes_on_after_the_last_complete_instance(wiring_record):
+    ran, _ = wiring_record
+    running = wiring.recorded([DISPLAY])
+    first, _ = next(running)
+    running.close()
+    ran.clear()
+    assert first not in dict(wiring.recorded([DISPLAY]))
+    assert ran and not wiring.due()
+
+
+def test_a_survivor_in_the_record_runs_again_until_it_has_a_reason(wiring_record, monkeypatch):
+    ran, blind = wiring_record
+    survivor = next(m for m in Design.of([DISPLAY]).mutants() if not wiring.constant(m))
+    blind.add(survivor.name)
+    dict(wiring.recorded([DISPLAY]))
+    assert list(wiring.survivors().values()) == [[survivor.name]]
+    assert wiring.summary().splitlines()[1].split()[-1] == "1"
+    ran.clear()
+    dict(wiring.recorded([DISPLAY]))
+    assert survivor.name in ran
+    monkeypatch.setattr(wiring, "reasons", lambda: {survivor.name: "a reason"})
+    assert not wiring.due() and not wiring.survivors()
+    assert wiring.summary().splitlines()[1].split()[-2:] == ["1", "0"]
+
+
+def test_an_instance_with_a_stale_reason_does_not_come_into_the_record(wiring_record, monkeypatch):
+    found = Design.of([DISPLAY]).mutants()[0]
+    monkeypatch.setattr(wiring, "reasons", lambda: {found.name: "a reason"})
+    dict(wiring.recorded([DISPLAY]))
+    assert wiring.due() == {wiring.place_of(found.connection)}
