@@ -11,9 +11,9 @@ from figures.common import Figure, Quick, console
 from figures.synthesis import SynthesisError
 from mutation import blocks
 from mutation.block import MutationError
+from mutation.command import ENOUGH
 from twin.build import ROOT
 
-ENOUGH = 95  # percent of the mutants of a block
 TINY, FEW = "step_permission", 20  # a small block, and some of its mutants
 WEAK, FEWER = "latency_is_0", 4  # a test of it that does not see all of these
 

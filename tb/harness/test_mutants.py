@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mutation import block, blocks, equivalence
+from mutation import block, blocks, command, equivalence, record
 from mutation.block import Run, mutant_of, mutants_of
 from tb.bench import ROOT
 from tb.simulator import of_mutants, source_of
@@ -169,3 +169,21 @@ def test_the_request_of_another_block_is_refused(tmp_path):
     (tmp_path / "request").write_text(json.dumps({"block": "tick_divider"}))
     with pytest.raises(pytest.skip.Exception, match="mutants of tick_divider only"):
         of_mutants(tmp_path / "request", source_of("time_stamp"), {"W": 4}, "x")
+
+
+def test_the_summary_of_the_record_adds_up_and_names_what_is_missing(tmp_path, monkeypatch):
+    path = tmp_path / "mutants.toml"
+    monkeypatch.setattr(record, "MUTANTS", path)
+    monkeypatch.setitem(record.HEADS, path, "# a record\n")
+    numbers = {
+        "good": (60, 58, 2, [], []),
+        "weak": (50, 36, 10, ["one", "two"], ["three: why", "x"]),
+    }
+    for name, values in numbers.items():
+        entry = dict(zip(("mutants", "found", "equivalent", "survivors", "explained"), values))
+        record.add(name, entry, path)
+    assert command.summary(["good", "weak", "new"]).splitlines() == [
+        "2 of 3 have been run: 94 of 98 mutants found (95.9 %), 2 with a reason, 2 survivors",
+        "under 95 %: weak",
+        "not run: new",
+    ]
