@@ -77,7 +77,8 @@ class Campaign:
     """The mutants of a design."""
 
     def __init__(self, top, path):
-        bench = getattr(import_module(f"tb.wiring.{top}"), top.title().replace("_", ""))
+        name = "".join(word.capitalize() for word in top.split("_"))
+        bench = getattr(import_module(f"tb.wiring.{top}"), name)
         self.make = lambda mutant: bench(path, mutant)
         self.make((0, 0, 0)).close()
         self.tests = collect(top)

@@ -5,6 +5,7 @@ import pytest
 
 from tb.wiring.axis_inputs import AxisInputs
 from tb.wiring.display_port import DisplayPort
+from tb.wiring.i2c_port import I2cPort
 from tb.wiring.node import Node
 from tb.wiring.peripherals import Peripherals
 from tb.wiring.process_link import ProcessLink
@@ -55,5 +56,13 @@ def process_link():
 def axis_inputs():
     """The inputs of an axis before their reset."""
     made = AxisInputs()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def i2c_port():
+    """The I2C port before its reset."""
+    made = I2cPort()
     yield made
     made.close()
