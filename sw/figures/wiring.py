@@ -5,7 +5,7 @@ test that fails. The campaign over all connections is `make soak K=wiring`.
 
 from campaigns.campaign import Campaign, Counts
 from figures.common import Figure, Quick, bar, console
-from mutation import wiring
+from mutation import wiring, wiring_record
 from mutation.connections import diagrams
 
 QUICK_S = 30  # after which no further mutant is begun
@@ -30,14 +30,14 @@ def wiring_survivors(seconds: float | None = None) -> float:
     if seconds is not None:
         return changed_only(seconds)
     with bar("instances") as progress:
-        task = progress.add_task("", total=len(wiring.due()))
-        for _, verdicts in wiring.recorded(diagrams()):
+        task = progress.add_task("", total=len(wiring_record.due()))
+        for _, verdicts in wiring_record.recorded(diagrams()):
             progress.advance(task)
             for line in verdicts.stale:
                 console.print(f"  {line}")
-    console.print(wiring.summary())
-    survivors = sum(map(len, wiring.survivors().values()))
-    return float(survivors + len(wiring.due() - set(wiring.survivors())))
+    console.print(wiring_record.summary())
+    survivors = sum(map(len, wiring_record.survivors().values()))
+    return float(survivors + len(wiring_record.due() - set(wiring_record.survivors())))
 
 
 FIGURES = {
@@ -65,7 +65,7 @@ def verdicts_of(place: wiring.Place) -> wiring.Verdicts:
 def faults_of_part(part: int, seed: int) -> Counts:
     """The faults are the same for every seed: the tests draw numbers of their own."""
     counts = {"faults": 0, "survivors": 0, "explained": 0}
-    for place in sorted(wiring.instances())[part::PARTS]:
+    for place in sorted(wiring_record.instances())[part::PARTS]:
         verdicts = verdicts_of(place)
         counts["faults"] += len(verdicts.killed) + len(verdicts.explained) + verdicts.failures
         counts["survivors"] += verdicts.failures

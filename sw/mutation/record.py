@@ -23,7 +23,7 @@ HEADS = {
     WIRING: """\
 # SPDX-License-Identifier: Apache-2.0
 # The faults in the connections of which instances have been run, and which of them no test sees.
-# Written by `make figure NAME=wiring_survivors` and `python -m mutation.wiring --record`;
+# Written by `make figure NAME=wiring_survivors` and `python -m mutation.wiring_record`;
 # docs/wiring.md says how to read it.
 """,
 }

@@ -3,8 +3,6 @@
 fails.
 
 python -m mutation.wiring [FILE …]      the mutants of these diagrams, or of all; see --help
-python -m mutation.wiring --record      those of instances that docs/wiring.toml does not have
-python -m mutation.wiring --summary     what docs/wiring.toml has
 
 Each design of DESIGNS has tests in tb/wiring, which run on a build that contains all mutants of one
 diagram. A survivor is an error unless wiring.toml has its reason; a reason for a mutant that does
@@ -13,8 +11,6 @@ not exist any more, or that a test finds, is an error as well.
 
 import argparse
 import fnmatch
-import hashlib
-import json
 import re
 import subprocess
 import sys
@@ -26,9 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
 
-from mutation import record
 from mutation.connections import RTL, Connection, diagrams, of_diagram
 from mutation.library import library
 from mutation.mutants import Design, Mutant
@@ -275,86 +269,12 @@ def place_of(connection: Connection) -> Place:
     return connection.file, connection.instance
 
 
-def name_of(place: Place) -> str:
-    """The name of an instance in the record: as the names of its mutants begin."""
-    file, instance = place
-    return f"{file.relative_to(RTL)}: {instance}"
-
-
-@cache
-def instances() -> dict[Place, str]:
-    """The instances of all diagrams, each with a hash of its connections."""
-    found: dict[Place, list[tuple[str, ...]]] = defaultdict(list)
-    for connection in (c for file in diagrams() for c in of_diagram(file)):
-        found[place_of(connection)].append((*key(connection), connection.width))
-    return {
-        place: hashlib.sha256(json.dumps(connections).encode()).hexdigest()[:12]
-        for place, connections in found.items()
-    }
-
-
-def known() -> dict[Place, dict[str, Any]]:
-    """The entries of the record whose instances have these connections still."""
-    entries = record.read(record.WIRING)
-    return {
-        place: entries[name_of(place)]
-        for place, connections in instances().items()
-        if entries.get(name_of(place), {}).get("connections") == connections
-    }
-
-
-def survivors() -> dict[Place, list[str]]:
-    """The survivors of the record that have no reason by now, if there are any."""
-    found = {
-        place: [name for name in entry["survivors"] if not pattern_of(name)]
-        for place, entry in known().items()
-    }
-    return {place: names for place, names in found.items() if names}
-
-
-def due() -> set[Place]:
-    """The instances to run: those that are not in the record, and those with survivors."""
-    return set(instances()) - set(known()) | set(survivors())
-
-
-def recorded(
-    files: Iterable[Path],
-    part: str = "",
-    jobs: int = 2,
-    report: Callable[[Mutant, str], None] = lambda mutant, test: None,
-) -> Iterator[tuple[Place, Verdicts]]:
-    """Run the instances of diagrams that are due and have this part in their names, and write each
-    into docs/wiring.toml as soon as it is complete, so an interrupted run can go on.
-    """
-    chosen = {place for place in due() if part in name_of(place)}
-    files = [file for file in files if any(place[0] == file for place in chosen)]
-    running = of_instances(files, lambda c: place_of(c) in chosen, jobs=jobs, report=report)
-    for place, verdicts in running:
-        entry: record.Entry = {
-            "connections": instances()[place],
-            "found": len(verdicts.killed),
-            "explained": len(verdicts.explained),
-            "survivors": [mutant.name for mutant in verdicts.survivors],
-        }
-        if not verdicts.stale:
-            record.add(name_of(place), entry, record.WIRING)
-        yield place, verdicts
-
-
-def summary() -> str:
-    """What the record has of each diagram, as a table."""
-    entries, unseen = known(), survivors()
-    lines = [f"{'diagram':20}  instances  not run  found  explained  survivors"]
-    for file in diagrams():
-        places = [place for place in instances() if place[0] == file]
-        ran = [entries[place] for place in places if place in entries]
-        left = sum(len(unseen.get(place, ())) for place in places)
-        explained = sum(entry["explained"] + len(entry["survivors"]) for entry in ran) - left
-        lines.append(
-            f"{file.stem:20}  {len(places):9}  {len(places) - len(ran):7}  "
-            f"{sum(entry['found'] for entry in ran):5}  {explained:9}  {left:9}"
-        )
-    return "\n".join(lines)
+def files_of(parser: argparse.ArgumentParser, names: Sequence[str]) -> list[Path]:
+    """The diagrams of these names below rtl/, or all; a name that is none ends the program."""
+    files = [RTL / name for name in names] or list(diagrams())
+    if missing := [name for name, file in zip(names, files) if not file.is_file()]:
+        parser.error(f"there is no rtl/{missing[0]}")
+    return files
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -365,22 +285,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--clocks", action="store_true", help="the clocks in place of all others")
     parser.add_argument("-j", type=int, default=2, metavar="JOBS")
     parser.add_argument("-k", default="", metavar="PART", help="connections with this in the name")
-    parser.add_argument(
-        "--record",
-        action="store_true",
-        help="run instances (-k: with this in the name) that docs/wiring.toml does not have yet, "
-        "and write them into it",
-    )
-    parser.add_argument(
-        "--summary", action="store_true", help="print what docs/wiring.toml has, run nothing"
-    )
     options = parser.parse_args(arguments)
-    if options.summary:
-        print(summary())
-        return 0
-    files = [RTL / name for name in options.files] or list(diagrams())
-    if missing := [name for name, file in zip(options.files, files) if not file.is_file()]:
-        parser.error(f"there is no rtl/{missing[0]}")
+    files = files_of(parser, options.files)
     new = changed() if options.changed else None
 
     def chosen(connection: Connection) -> bool:
@@ -390,12 +296,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for mutant in Design.of(files, options.clocks, chosen).mutants():
             print(f"{mutant.place}: {mutant.name}")
         return 0
-    if options.record:
-        verdicts = Verdicts()
-        for _, of_instance in recorded(files, options.k, options.j, told):
-            verdicts.add(of_instance)
-    else:
-        verdicts = run(files, chosen, options.clocks, options.j, report=told)
+    verdicts = run(files, chosen, options.clocks, options.j, report=told)
     print(verdicts.words)
     print(*verdicts.stale, sep="\n", end="")
     return int(verdicts.failures > 0)

@@ -8,7 +8,7 @@ import re
 
 import pytest
 
-from mutation import record, wiring
+from mutation import record, wiring, wiring_record
 from mutation.connections import RTL, diagrams, of_diagram
 from mutation.library import Bench, library
 from mutation.mutants import KINDS, Design, pairs, same_faults, unheard
@@ -155,7 +155,7 @@ def test_small_diagrams_of_a_design_share_a_build(monkeypatch):
 
 
 @pytest.fixture
-def wiring_record(tmp_path, monkeypatch):
+def runs(tmp_path, monkeypatch):
     """A record of its own, and the mutants that were run since; `blind` are those no test sees."""
     ran, blind = [], set()
 
@@ -168,56 +168,56 @@ def wiring_record(tmp_path, monkeypatch):
     monkeypatch.setattr(record, "WIRING", path)
     monkeypatch.setitem(record.HEADS, path, "# a record\n")
     monkeypatch.setattr(wiring, "campaign", campaign)
-    monkeypatch.setattr(wiring, "diagrams", lambda: (DISPLAY,))
-    forget = wiring.instances.cache_clear
+    monkeypatch.setattr(wiring_record, "diagrams", lambda: (DISPLAY,))
+    forget = wiring_record.instances.cache_clear
     forget()
     yield ran, blind
     forget()
 
 
 def test_an_instance_in_the_record_runs_again_only_if_its_connections_have_changed(
-    wiring_record, monkeypatch
+    runs, monkeypatch
 ):
-    ran, _ = wiring_record
-    assert len(dict(wiring.recorded([DISPLAY]))) == len(wiring.instances()) == 2
-    assert len(ran) == sum(entry["found"] for entry in wiring.known().values()) > 20
+    ran, _ = runs
+    assert len(dict(wiring_record.recorded([DISPLAY]))) == len(wiring_record.instances()) == 2
+    assert len(ran) == sum(entry["found"] for entry in wiring_record.known().values()) > 20
     ran.clear()
-    assert not dict(wiring.recorded([DISPLAY])) and not ran
-    changed = dict(wiring.instances())
+    assert not dict(wiring_record.recorded([DISPLAY])) and not ran
+    changed = dict(wiring_record.instances())
     (_, instance) = place = min(changed)
     changed[place] = "other"
-    monkeypatch.setattr(wiring, "instances", lambda: changed)
-    assert [place for place, _ in wiring.recorded([DISPLAY])] == [place]
+    monkeypatch.setattr(wiring_record, "instances", lambda: changed)
+    assert [place for place, _ in wiring_record.recorded([DISPLAY])] == [place]
     assert ran and all(f": {instance}." in name for name in ran)
 
 
-def test_an_interrupted_run_goes_on_after_the_last_complete_instance(wiring_record):
-    ran, _ = wiring_record
-    running = wiring.recorded([DISPLAY])
+def test_an_interrupted_run_goes_on_after_the_last_complete_instance(runs):
+    ran, _ = runs
+    running = wiring_record.recorded([DISPLAY])
     first, _ = next(running)
     running.close()
     ran.clear()
-    assert first not in dict(wiring.recorded([DISPLAY]))
-    assert ran and not wiring.due()
+    assert first not in dict(wiring_record.recorded([DISPLAY]))
+    assert ran and not wiring_record.due()
 
 
-def test_a_survivor_in_the_record_runs_again_until_it_has_a_reason(wiring_record, monkeypatch):
-    ran, blind = wiring_record
+def test_a_survivor_in_the_record_runs_again_until_it_has_a_reason(runs, monkeypatch):
+    ran, blind = runs
     survivor = next(m for m in Design.of([DISPLAY]).mutants() if not wiring.constant(m))
     blind.add(survivor.name)
-    dict(wiring.recorded([DISPLAY]))
-    assert list(wiring.survivors().values()) == [[survivor.name]]
-    assert wiring.summary().splitlines()[1].split()[-1] == "1"
+    dict(wiring_record.recorded([DISPLAY]))
+    assert list(wiring_record.survivors().values()) == [[survivor.name]]
+    assert wiring_record.summary().splitlines()[1].split()[-1] == "1"
     ran.clear()
-    dict(wiring.recorded([DISPLAY]))
+    dict(wiring_record.recorded([DISPLAY]))
     assert survivor.name in ran
     monkeypatch.setattr(wiring, "reasons", lambda: {survivor.name: "a reason"})
-    assert not wiring.due() and not wiring.survivors()
-    assert wiring.summary().splitlines()[1].split()[-2:] == ["1", "0"]
+    assert not wiring_record.due() and not wiring_record.survivors()
+    assert wiring_record.summary().splitlines()[1].split()[-2:] == ["1", "0"]
 
 
-def test_an_instance_with_a_stale_reason_does_not_come_into_the_record(wiring_record, monkeypatch):
+def test_an_instance_with_a_stale_reason_does_not_come_into_the_record(runs, monkeypatch):
     found = Design.of([DISPLAY]).mutants()[0]
     monkeypatch.setattr(wiring, "reasons", lambda: {found.name: "a reason"})
-    dict(wiring.recorded([DISPLAY]))
-    assert wiring.due() == {wiring.place_of(found.connection)}
+    dict(wiring_record.recorded([DISPLAY]))
+    assert wiring_record.due() == {wiring.place_of(found.connection)}
