@@ -26,7 +26,8 @@ from tb.relay.flash import Flash
 from tb.relay.relay_set import image
 from twin import crossings
 
-K, FIRST, SECOND, BIT = 2, 4096, 8192, 8
+K, FIRST, SECOND = 2, 4096, 8192
+BAUD, BIT = 4_800_000, 10  # cycles of a bit: more than the fewest, which act where it is 0
 COUNTS = 4000
 # The edges of the ring's index come with those of A and B. Behind the synchronisers they may come a
 # cycle before or after them, so without a gate the index may be found at the count next to it.
@@ -107,11 +108,12 @@ class Relay:
         while not int(self.dut.flash_chip_n.value) or self.clks < 2 * 2048 + 2 * 65 * 60:
             await self.clk(50)
 
-    async def send(self, words):
+    async def send(self, words, stop=1):
         for word in words:
-            for level in (0, *(word >> n & 1 for n in range(9)), 1):
+            for level in (0, *(word >> n & 1 for n in range(9)), stop):
                 self.dut.rs485_rx.value = level
                 await self.clk(BIT)
+            self.dut.rs485_rx.value = 1
 
     async def receive(self, timeout_clk=6000):
         """The words that the relay sends until it switches its driver off."""
@@ -130,8 +132,8 @@ class Relay:
             for _ in range(10):
                 await self.clk(BIT)
                 bits.append(int(self.dut.rs485_tx.value))
-            words.append(sum(bit << n for n, bit in enumerate(bits[:9])))
-            assert bits[9] == 1
+            words.append(sum(bit << n for n, bit in enumerate(bits[:8])))
+            assert bits[8:] == [0, 1], "the ninth bit marks what the host sends"
         return words
 
     async def request(self, kind, payload=b"", repeat=False):
@@ -201,6 +203,8 @@ async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
         and status.flags == 0
         and status.position == relay.count - COUNTS + 60
     )
+    found = status.correction, relay.count - corrected(relay.count, terms)
+    assert abs(found[0] - found[1]) < 0.05, found
 
 
 @cocotb.test()
@@ -314,6 +318,24 @@ async def a_broken_request_has_no_answer_and_the_next_one_has(dut):
 
 
 @cocotb.test()
+async def a_character_without_a_stop_bit_spoils_a_request_and_a_glitch_does_not(dut):
+    relay = await Relay(dut).power_up()
+    words = Exchange(bytes([9, STATUS])).words_to_send()
+    await relay.send(words[:3])
+    await relay.send([0x55], stop=0)
+    await relay.clk(2 * BIT)
+    await relay.send(words[3:])
+    assert await relay.receive(timeout_clk=400) == []
+    await relay.send(words[:3])
+    dut.rs485_rx.value = 0
+    await relay.clk(BIT // 4)
+    dut.rs485_rx.value = 1
+    await relay.clk(2 * BIT)
+    await relay.send(words[3:])
+    assert await relay.receive(timeout_clk=400)
+
+
+@cocotb.test()
 async def a_saved_set_comes_back_at_power_up_whenever_power_failed(dut):
     old, new = (image(some_terms(size), COUNTS) for size in (1.0, 2.0))
     chip = Flash(1 << 14)
@@ -353,15 +375,18 @@ async def reset_in_mid_flow(dut):
     await relay.send_set(image(some_terms(), COUNTS, **GATED))
     await relay.go(30)
     await relay.send(Exchange(bytes([1, BEGIN_SET, 1, 2])).words_to_send()[:4])
-    dut.rst.value = 1
+    dut.rs485_rx.value = 0  # a start bit
+    await relay.clk(2 * BIT)
+    dut.rst.value, dut.rs485_rx.value = 1, 1
     for n in range(24):  # the outputs return to the levels of the ring
         dut.rst.value, relay.levels = int(n < 3), None
         await relay.clk()
     assert not int(dut.correcting.value) and not int(dut.fault.value)
+    assert (await relay.status()).levels == READING, "also in the middle of a character"
     relay.clks = 0
     await relay.booted()
     assert (await relay.status()).levels == 0
 
 
 def test_relay():
-    run("relay", __file__, K=K, BAUD=6_000_000, FIRST=FIRST, SECOND=SECOND)
+    run("relay", __file__, K=K, BAUD=BAUD, FIRST=FIRST, SECOND=SECOND)

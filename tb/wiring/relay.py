@@ -7,7 +7,7 @@ from tb.system import test_relay
 TOP = "relay"
 PARAMETERS = {
     "K": test_relay.K,
-    "BAUD": 6_000_000,
+    "BAUD": test_relay.BAUD,
     "FIRST": test_relay.FIRST,
     "SECOND": test_relay.SECOND,
 }

@@ -95,6 +95,23 @@ def test_samples_come_with_their_period(node):
     assert scale.phase == [0, 0]
 
 
+def test_the_age_of_a_captured_position_counts_from_its_sample(node):
+    Scale(node)
+    period = 500
+    node.write("node.sample_period", period)
+    node.write("feedback.capture_sources", 4)
+    node.run(3 * period)
+    ages, samples = [], []
+    for _ in range(6):
+        node.write("feedback.strobes", capture_now=1)
+        node.run(70)
+        ages.append(node.read("feedback.captured", "age"))
+        samples.append((node.read("feedback.captured_time") - ages[-1]) % period)
+        node.write("feedback.capture_next")
+    assert len(set(samples)) == 1
+    assert max(ages) < period and len(set(ages)) > 3
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 def test_the_correction_of_an_axis_is_loaded_as_a_whole(node, axis):
     scale = Scale(node)
