@@ -107,7 +107,7 @@ def test_the_age_of_a_captured_position_counts_from_its_sample(node):
         node.run(70)
         ages.append(node.read("feedback.captured", "age"))
         samples.append((node.read("feedback.captured_time") - ages[-1]) % period)
-        node.write("feedback.capture_next")
+        node.write("feedback.strobes", capture_next=1)
     assert len(set(samples)) == 1
     assert max(ages) < period and len(set(ages)) > 3
 
