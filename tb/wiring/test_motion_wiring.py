@@ -334,6 +334,20 @@ def test_the_velocity_between_two_steps_has_the_sign_of_the_steps(node):
 
 
 @pytest.mark.parametrize("axis", [0, 1])
+def test_an_edge_that_is_passed_up_and_down_is_at_one_place(node, axis):
+    """Between the step up over an edge and the step down over it the way is 0."""
+    node.start()
+    node.write("feedback.velocity_quantum", COUNT, axis=axis)
+    node.count(axis, 4, 2 * TICK)
+    for sign in (-1, 1):
+        node.count(axis, sign, 2 * TICK)
+        assert abs(node.read("axis.velocity", axis=axis)) < COUNT / 10
+        node.count(axis, 3 * sign, 2 * TICK)
+        expected = sign * COUNT / 2
+        assert node.read("axis.velocity", axis=axis) == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
 def test_the_servo_answers_an_error_with_the_gains_of_its_axis(node, axis):
     node.start()
     node.write("axis.kp", 1000, axis=axis)
