@@ -413,6 +413,10 @@ def test_a_segment_table_corrects_the_position_and_moves_the_target_with_it(node
     node.count(axis, 1)
     node.run(400)
     assert node.read("axis.position", axis=axis) == 7 * COUNT + 750
+    node.write("feedback.segment_use", enable=1, segments=3, linear=0, axis=axis)
+    node.run(400)
+    assert node.read("feedback.segment_error", axis=axis) == 500, "the mean, also beside the middle"
+    node.write("feedback.segment_use", enable=1, segments=3, linear=1, axis=axis)
     assert "outside" not in node.bits("feedback.segment_state", axis)
     node.count(axis, 9)
     node.run(400)
