@@ -95,6 +95,27 @@ def test_samples_come_with_their_period(node):
     assert scale.phase == [0, 0]
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_clock_of_a_converter_rests_high_and_a_reset_ends_a_frame(node, axis):
+    Scale(node)
+    node.write("node.sample_period", 100)
+    node.run(300)
+    node.watch("adc_cs_n", "adc_sclk")
+    node.run(200)
+    changes = [(c.pin, c.cycle, c.value >> axis & 1) for c in node.changes()]
+    began = next(cycle for pin, cycle, level in changes if pin == "adc_cs_n" and not level)
+    frame = [c for c in changes if began <= c[1] < began + 100]
+    clock = [(cycle - began, level) for pin, cycle, level in frame if pin == "adc_sclk"]
+    assert clock[:3] == [(1, 0), (2, 1), (3, 0)]
+    assert clock[-1][1] == 1 and len(clock) == 28
+    while node.get("adc_cs_n") >> axis & 1:
+        node.run(1)
+    node.run(3)
+    node.set(rst=1)
+    node.run(2)
+    assert node.get("adc_cs_n") >> axis & node.get("adc_sclk") >> axis & 1
+
+
 def test_the_age_of_a_captured_position_counts_from_its_sample(node):
     Scale(node)
     period = 500
