@@ -116,6 +116,24 @@ def test_the_clock_of_a_converter_rests_high_and_a_reset_ends_a_frame(node, axis
     assert node.get("adc_cs_n") >> axis & node.get("adc_sclk") >> axis & 1
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_position_is_that_of_the_last_sample(node, axis):
+    """Not that of the one before, which only a moving scale shows."""
+    scale = Scale(node)
+    period = 4000
+    node.write("node.sample_period", period)
+    node.run(2 * period)
+    begun = node.read("axis.position", axis=axis)
+    for phase in (0.1, 0.25, 0.15):
+        scale.phase[axis] = phase
+        scale.show(axis)
+        assert node.reaches("adc_cs_n", 0, 2 * period, 1 << axis)
+        node.run(100)
+        moved = node.read("axis.position", axis=axis) - begun
+        assert abs(moved - phase * PERIOD) < 700
+        node.run(period // 2)
+
+
 def test_the_age_of_a_captured_position_counts_from_its_sample(node):
     Scale(node)
     period = 500
