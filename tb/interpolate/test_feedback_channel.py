@@ -110,6 +110,31 @@ async def a_shared_chain_has_a_word_at_once_and_its_step_is_in_the_position_1_cy
 
 
 @cocotb.test()
+async def what_a_shared_chain_has_of_another_axis_stays_outside(dut):
+    needs(not int(dut.HAS_OWN_CHAIN.value), "the chain is its own")
+    await begin(dut)
+
+    def shown():
+        return dut.sin.value.to_signed(), dut.cos.value.to_signed(), int(dut.phase.value)
+
+    dut.chain_sin.value, dut.chain_cos.value, dut.chain_sampled.value = 50, -60, 1
+    dut.chain_phase.value, dut.chain_done.value = 7000, 1
+    await FallingEdge(dut.clk)
+    assert shown() == (50, -60, 7000)
+    dut.chain_sampled.value = dut.chain_done.value = 0
+    dut.chain_sin.value, dut.chain_cos.value, dut.chain_phase.value = -1, 2, 900
+    for _ in range(4):
+        await FallingEdge(dut.clk)
+        assert shown() == (50, -60, 7000)
+    dut.chain_sampled.value = 1
+    await FallingEdge(dut.clk)
+    assert shown() == (-1, 2, 7000)
+    dut.chain_sampled.value, dut.chain_done.value = 0, 1
+    await FallingEdge(dut.clk)
+    assert shown() == (-1, 2, 900)
+
+
+@cocotb.test()
 async def a_sample_that_a_shared_chain_lost_is_the_event_overspeed(dut):
     needs(not int(dut.HAS_OWN_CHAIN.value), "the chain is its own")
     await begin(dut)
