@@ -18,7 +18,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+)
 
 from campaigns.campaign import seeds as seeds
 from moire.errors import MoireError
@@ -112,11 +119,38 @@ def shares(total: int, share: int, seed: int) -> Iterator[tuple[int, int]]:
     return zip(sizes, seeds(seed, len(sizes)), strict=True)
 
 
-def bar(text: str) -> Progress:
+class Bar(Progress):
+    """A progress bar. Where the output is no terminal, as in a log, each tenth of the work is a
+    line instead, since the bar itself appears at the end only.
+    """
+
+    def __init__(self, text: str, output: Console = console):
+        columns = TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+        super().__init__(*columns, console=output)
+        self.text, self.tenths = text, dict[TaskID, int]()
+
+    def advance(self, task_id: TaskID, advance: float = 1) -> None:
+        super().advance(task_id, advance)
+        self.tell(task_id)
+
+    def update(self, task_id: TaskID, **values: Any) -> None:
+        super().update(task_id, **values)
+        self.tell(task_id)
+
+    def tell(self, task_id: TaskID) -> None:
+        """Print a line if there is no terminal and a further tenth of the task is done."""
+        task = next(task for task in self.tasks if task.id == task_id)
+        if self.console.is_terminal or not task.total:
+            return
+        tenth = int(10 * task.completed / task.total)
+        if self.tenths.get(task_id, 0) < tenth < 10:
+            self.tenths[task_id] = tenth
+            self.console.print(f"{self.text}: {10 * tenth} % after {task.elapsed or 0:.0f} s")
+
+
+def bar(text: str) -> Bar:
     """A progress bar for long work."""
-    return Progress(
-        TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console
-    )
+    return Bar(text)
 
 
 def in_processes(

@@ -4,16 +4,18 @@ README's table that is made from it.
 """
 
 import inspect
+import io
 import json
 import math
 from datetime import date
 
 import pytest
+from rich.console import Console
 
 from experiments import start_page
 from figures import comparison, record, synthesis
 from figures import figure as command
-from figures.common import Absent, Figure, Quick, collected, seeds, shares, within
+from figures.common import Absent, Bar, Figure, Quick, collected, seeds, shares, within
 from tables import readme_figures
 
 
@@ -165,3 +167,17 @@ def test_a_design_that_does_not_fit_is_reported_with_what_is_too_much(tmp_path):
     )
     assert synthesis.overfull(log) == "11472 ICESTORM_LC of 5280"
     assert synthesis.overfull(tmp_path / "none") == ""
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_where_there_is_no_terminal_a_line_tells_each_tenth_of_long_work(terminal):
+    text = io.StringIO()
+    with Bar("moves", Console(file=text, force_terminal=terminal)) as progress:
+        task = progress.add_task("", total=40)
+        for _ in range(40):
+            progress.advance(task)
+        task = progress.add_task("", total=2.5)
+        progress.update(task, completed=1.0)
+    told = [line.split(" after ")[0] for line in text.getvalue().splitlines() if "after" in line]
+    tenths = [f"moves: {percent} %" for percent in (*range(10, 100, 10), 40)]
+    assert told == ([] if terminal else tenths)
