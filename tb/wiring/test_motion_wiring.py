@@ -418,6 +418,86 @@ def test_the_period_of_a_bridge_is_its_setting(node):
     assert {b - a for a, b in zip(falls, falls[1:])} == {100}
 
 
+def test_a_bridge_takes_its_period_with_a_command(node):
+    node.start()
+    node.write("node.tick_period", 20_000)
+    node.enable(0)
+    node.write("axis.open_command", FULL // 2)
+    node.run(40_000)
+    delays = []
+    for period, wait in ((100, 7_000), (200, 7_000), (100, 0)):
+        node.write("actuator.pwm_period", period)
+        node.watch("bridge_b")
+        node.run(25_000)
+        falls = [c.cycle for c in node.changes() if not c.value]
+        changed = next(a for a, b in zip(falls, falls[1:]) if b - a == period)
+        delays.append(changed - falls[0])
+        node.run(wait)
+    assert max(delays) > 2_000, "some of them were written long before the next command"
+
+
+def test_a_dac_gets_a_word_with_each_command(node):
+    node.start()
+    node.write("actuator.drive", 2)
+    node.write("actuator.dac", half_period=1, refresh=0xFFFF)
+    node.enable(0)
+    node.ticks(3)
+    node.watch("dac_cs_n")
+    node.ticks(8)
+    assert len([c for c in node.changes() if not c.value & 1]) in (7, 8, 9)
+
+
+@pytest.mark.parametrize("drive", [0, 2, 3])
+def test_an_axis_with_another_drive_makes_no_steps(node, drive):
+    node.start()
+    node.write("actuator.drive", drive)
+    node.write("actuator.step_ratio", 40 << 32)
+    node.enable(0)
+    node.ticks(3)
+    node.watch("step", "direction")
+    play(node, 0, 0x4000, 4)
+    node.ticks(8)
+    assert not node.changes() and node.read("actuator.steps") == 0
+
+
+@pytest.mark.parametrize("step_low, direction_low", [(0, 1), (1, 0)])
+def test_each_pin_of_a_stepper_has_its_own_polarity(node, step_low, direction_low):
+    node.start()
+    node.write("actuator.drive", 1)
+    node.write("actuator.step_output", step_low=step_low, direction_low=direction_low)
+    node.run(80)
+    assert (node.get("step") & 1, node.get("direction") & 1) == (step_low, direction_low)
+
+
+def test_a_tick_that_comes_late_adds_no_steps(node):
+    """A sync pulse begins a new tick, so the line of the one before ends before the next begins."""
+    node.start()
+    node.write("bus.bit_time", 256)
+    node.write("actuator.drive", 1)
+    node.write("actuator.step_ratio", 40 << 32)
+    node.enable(0)
+    node.ticks(3)
+    node.write("bus.sync_axes", 2)  # another axis; the tick is that of both
+    play(node, 0, 0x4000, 20)
+    node.ticks(6)
+    for _ in range(3):
+        node.send_sync()
+    node.ticks(20)
+    assert node.read("bus.syncs") == 3
+    assert node.read("actuator.steps") == 200
+
+
+def test_steps_faster_than_the_clock_are_a_fault(node):
+    node.start()
+    node.write("actuator.drive", 1)
+    node.write("actuator.step_ratio", 32767 << 32)
+    node.enable(0)
+    node.ticks(3)
+    play(node, 0, 0x4000, 4)
+    node.ticks(8)
+    assert "step_overrun" in node.bits("axis.faults")
+
+
 def steps_of(node, axis, name="step"):
     return [c.cycle for c in node.changes() if c.pin == name and c.value >> axis & 1]
 
