@@ -116,6 +116,33 @@ def test_a_command_of_the_machine_reaches_the_keyboard(peripherals):
     assert not any(peripherals.read("ps2_errors").values())
 
 
+def test_a_damaged_command_of_the_machine_reaches_the_keyboard_damaged(peripherals):
+    peripherals.active = {"keyboard", "edm"}
+    machine = peripherals.machine
+    whole = machine.order
+
+    def damaged(byte):
+        machine.order = whole
+        return whole(byte, damaged=1)
+
+    machine.order, machine.orders = damaged, [0xED]
+    peripherals.until(lambda: machine.received)
+    assert machine.received == [0xFE], "the keyboard asks for it again"
+    assert not peripherals.keyboard.commands
+
+
+def test_ps2_is_busy_from_the_first_bit_of_the_keyboard_on(peripherals):
+    peripherals.active = {"keyboard"}
+    assert peripherals.read("ps2_state")["busy"] == 0
+    peripherals.keyboard.outbox = [0x1C]
+    for _ in range(MS):
+        peripherals.clk()
+        if peripherals.keyboard.clock_low:
+            break
+    peripherals.clk(40)
+    assert peripherals.read("ps2_state")["busy"] == 1
+
+
 def test_each_error_of_ps2_is_counted(peripherals):
     zero = dict(keyboard_damaged=0, command_damaged=0, unsent=0, aborted=0)
     peripherals.active = {"keyboard", "edm"}
