@@ -9,6 +9,7 @@ from moire.client.relay import identity_of
 from tb.bench import run, steady_only
 from tb.relay.relay_set import image
 from tb.system.test_relay import (
+    BAUD,
     BIT,
     CORRECTING,
     COUNTS,
@@ -86,4 +87,4 @@ async def a_saved_table_comes_back_at_power_up(dut):
 
 
 def test_relay_segments():
-    run("relay", __file__, SEGMENTS=SEGMENTS, BAUD=6_000_000, FIRST=FIRST, SECOND=SECOND)
+    run("relay", __file__, SEGMENTS=SEGMENTS, BAUD=BAUD, FIRST=FIRST, SECOND=SECOND)
