@@ -8,18 +8,16 @@ The campaign of 20 whole jobs of 36 stations is `make soak K=s4_jobs`.
 import math
 import random
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
+from functools import partial
 
 from campaigns.campaign import Campaign, Counts
 from experiments import s4_job
-from figures.common import Figure, Quick, bar, console, seeds
+from figures.common import Figure, Quick, console, in_processes, seeds
 from moire.client.bus import Bus
 from moire.client.indexing_table import IndexingTable
 from twin import Axis, Node, Twin, TwinTransport, build
 
-PROCESSES = 2
 JOBS = 20
 STATIONS = 36
 SUB_NODE = {**s4_job.NODE, "HAS_ANGLE_SENSOR": 1}  # no other peripheral
@@ -88,12 +86,9 @@ def short_job(seed: int) -> s4_job.Outcome:
 def jobs(job: Job, count: int, seed: int = 1) -> list[s4_job.Outcome]:
     s4_job.IndexingMachine().twin.close()  # builds the twin once
     made = []
-    with bar("jobs") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
-        for outcome in progress.track(pool.map(job, seeds(seed, count)), total=count):
-            made.append(outcome)
-            progress.console.print(
-                f"job {len(made)}: {outcome.words}; {len(outcome.answers)} answers"
-            )
+    for outcome in in_processes("jobs", job, [1] * count, seeds(seed, count)):
+        made.append(outcome)
+        console.print(f"job {len(made)}: {outcome.words}; {len(outcome.answers)} answers")
     cuts = sum(len(outcome.cuts) for outcome in made)
     failed = sum(outcome.failed for outcome in made)
     worst = max(outcome.worst for outcome in made)
@@ -108,14 +103,11 @@ def s4_index_arcsec_max(
 ) -> float:
     """The host sends the stations to the table's node, as the main node does in a job."""
     build.twin_library(s4_job.CLK_HZ, 1, SUB_NODE)
-    with bar("tables") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
-        worst = []
-        errors = pool.map(indexed, seeds(seed, count), [stations] * count, [share] * count)
-        for error in progress.track(errors, total=count):
-            worst.append(error)
-            progress.console.print(
-                f"table {len(worst)}: at most {error:.2f} arcsec at {stations} stations"
-            )
+    worst = []
+    run = partial(indexed, stations=stations, share=share)
+    for error in in_processes("tables", run, [1] * count, seeds(seed, count)):
+        worst.append(error)
+        console.print(f"table {len(worst)}: at most {error:.2f} arcsec at {stations} stations")
     return max(worst)
 
 

@@ -36,8 +36,9 @@ def wiring_survivors(seconds: float | None = None) -> float:
             for line in verdicts.stale:
                 console.print(f"  {line}")
     console.print(wiring_record.summary())
-    survivors = sum(map(len, wiring_record.survivors().values()))
-    return float(survivors + len(wiring_record.due() - set(wiring_record.survivors())))
+    survivors = wiring_record.survivors()
+    stale = wiring_record.due() - set(survivors)
+    return float(sum(map(len, survivors.values())) + len(stale))
 
 
 FIGURES = {

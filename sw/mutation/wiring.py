@@ -47,6 +47,7 @@ ABSENT = {
 ZERO = re.compile(r"(\d*'[bdh]?0+|0)")
 ONE = re.compile(r"(1'b1|1'd1)")
 Place = tuple[Path, str]  # a diagram and an instance in it
+Report = Callable[[Mutant, str], None]  # takes a mutant and the test that finds it, "" for none
 
 
 def design_of(file: Path) -> str:
@@ -205,13 +206,24 @@ def together(files: Iterable[Path], most: int = MOST) -> list[list[Path]]:
     return groups
 
 
+def silent(mutant: Mutant, test: str) -> None:
+    """Print nothing of the result of a mutant."""
+
+
+def told(mutant: Mutant, test: str) -> None:
+    """Print the result of a mutant."""
+    print(f"{mutant.name}: {test or 'NO TEST'}", file=sys.stderr, flush=True)
+    if not test and not pattern_of(mutant.name):
+        print(f"{mutant.place}: {mutant.name}: no test sees it", file=sys.stderr, flush=True)
+
+
 def of_instances(
     files: Iterable[Path],
     chosen: Callable[[Connection], bool],
     clocks: bool = False,
     jobs: int = 2,
     seconds: float = float("inf"),
-    report: Callable[[Mutant, str], None] = lambda mutant, test: None,
+    report: Report = silent,
 ) -> Iterator[tuple[Place, Verdicts]]:
     """Run the mutants of diagrams, one build after the other; none is begun after so many seconds.
     Each instance with its verdicts, as soon as all its mutants have run; at the end those of which
@@ -248,20 +260,13 @@ def run(
     clocks: bool = False,
     jobs: int = 2,
     seconds: float = float("inf"),
-    report: Callable[[Mutant, str], None] = lambda mutant, test: None,
+    report: Report = silent,
 ) -> Verdicts:
     """The verdicts of all mutants of diagrams together, as of_instances runs them."""
     verdicts = Verdicts()
     for _, of_instance in of_instances(files, chosen, clocks, jobs, seconds, report):
         verdicts.add(of_instance)
     return verdicts
-
-
-def told(mutant: Mutant, test: str) -> None:
-    """Print the result of a mutant."""
-    print(f"{mutant.name}: {test or 'NO TEST'}", file=sys.stderr, flush=True)
-    if not test and not pattern_of(mutant.name):
-        print(f"{mutant.place}: {mutant.name}: no test sees it", file=sys.stderr, flush=True)
 
 
 def place_of(connection: Connection) -> Place:

@@ -12,14 +12,13 @@ import hashlib
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from mutation import record, wiring
 from mutation.connections import RTL, diagrams, of_diagram
-from mutation.mutants import Mutant
 
 
 def name_of(place: wiring.Place) -> str:
@@ -68,7 +67,7 @@ def recorded(
     files: Iterable[Path],
     part: str = "",
     jobs: int = 2,
-    report: Callable[[Mutant, str], None] = lambda mutant, test: None,
+    report: wiring.Report = wiring.silent,
 ) -> Iterator[tuple[wiring.Place, wiring.Verdicts]]:
     """Run the instances of diagrams that are due and have this part in their names, and write each
     into docs/wiring.toml as soon as it is complete, so an interrupted run can go on.
