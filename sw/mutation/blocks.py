@@ -23,7 +23,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from mutation import command, equivalence, record
+from campaigns import record
+from mutation import command, equivalence
 from mutation.block import BUILD, CellMutant, Fault, MutationError, Run, mutants_of
 from twin.build import ROOT, rtl_path
 

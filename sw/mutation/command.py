@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Collection, Sequence
 from typing import Protocol, TypeVar
 
-from mutation import record
+from campaigns import record
 from mutation.block import MutationError
 
 

@@ -19,7 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from mutation import command, record
+from campaigns import record
+from mutation import command
 from mutation.block import BUILD, MutationError
 from twin.build import ROOT
 

@@ -17,7 +17,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mutation import record, wiring
+from campaigns import record
+from mutation import wiring
 from mutation.connections import RTL, diagrams, of_diagram
 
 

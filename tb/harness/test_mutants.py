@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from mutation import block, blocks, command, equivalence, record
+from campaigns import record
+from mutation import block, blocks, command, equivalence
 from mutation.block import Run, mutant_of, mutants_of
 from tb.bench import ROOT
 from tb.simulator import of_mutants, source_of

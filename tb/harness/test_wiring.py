@@ -8,7 +8,8 @@ import re
 
 import pytest
 
-from mutation import record, wiring, wiring_record
+from campaigns import record
+from mutation import wiring, wiring_record
 from mutation.connections import RTL, diagrams, of_diagram
 from mutation.library import Bench, library
 from mutation.mutants import KINDS, Design, pairs, same_faults, unheard

@@ -694,8 +694,27 @@ def test_a_dac_repeats_its_word_after_the_refresh_time(node):
 
 
 @pytest.mark.parametrize("axis", [0, 1])
+def test_the_clock_of_a_dac_rests_low_and_a_reset_ends_a_word(node, axis):
+    node.start()
+    node.write("actuator.drive", 2, axis=axis)
+    node.write("actuator.dac", half_period=20, refresh=2000, axis=axis)
+    node.enable(axis)
+    node.run(4000)
+    for level in (-1, 0, -1):  # after a word, before one, after it
+        assert node.reaches("dac_cs_n", level, 4000, 1 << axis)
+        assert not node.get("dac_sclk") >> axis & 1
+    assert node.reaches("dac_cs_n", 0, 4000, 1 << axis)
+    node.run(100)
+    node.set(rst=1)
+    node.run(2)
+    assert node.get("dac_cs_n") >> axis & 1
+    node.set(rst=0)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
 def test_the_fine_stage_holds_by_its_gains_and_limit(node, axis):
     node.start()
+    node.count(axis, 9)
     node.write("axis.strobes", set_target_to_position=1, axis=axis)
     node.write("actuator.fine_kp", 1000, axis=axis)
     node.write("actuator.fine_ki", 0, axis=axis)
@@ -732,6 +751,33 @@ def test_the_fine_stage_holds_by_its_gains_and_limit(node, axis):
     node.watch_words("dac_cs_n", "dac_sclk", "dac_sdi")
     node.run(TICK)
     assert {word for _, word, _ in words(node, axis)} == {32768}
+    assert node.read("actuator.fine_command", axis=axis) == 0
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_fine_stage_leaves_its_command_slowly_but_at_once_in_a_reset(node, axis):
+    node.start()
+    node.write("actuator.fine_kp", 1000, axis=axis)
+    node.write("actuator.fine_ki", 1, axis=axis)
+    node.write("actuator.fine_limit", 20000, axis=axis)
+    node.enable(axis, fine=1)
+    node.ticks(2)
+    node.count(axis, -4)
+    node.ticks(3)
+    held = node.read("actuator.fine_command", axis=axis)
+    assert held == 1000
+    node.write("actuator.fine_kp", 3000, axis=axis)
+    node.ticks(4)
+    assert abs(node.read("actuator.fine_command", axis=axis) - held) < 50, "no bump"
+    node.enable(axis)
+    node.ticks(4)
+    returning = node.read("actuator.fine_command", axis=axis)
+    assert held - 5 * 16 - 50 < returning < held - 3 * 16 + 50
+    node.set(rst=1)
+    node.run(16)
+    node.set(rst=0)
+    node.run(40)
+    assert node.read("actuator.fine_command", axis=axis) == 0
 
 
 @pytest.mark.parametrize("axis", [0, 1])

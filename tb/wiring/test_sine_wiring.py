@@ -25,6 +25,7 @@ class Scale:
     def __init__(self, node):
         self.node, self.phase = node.start(counts=False), [0.0, 0.0]
         self.gain, self.offset = [1.0, 1.0], [(0, 0), (0, 0)]
+        self.phase_error = [0.0, 0.0]  # periods by which the sine is ahead
         self.comparators = True
         for axis in (0, 1):
             node.write("feedback.harmonic_enable", 0, axis=axis)
@@ -36,7 +37,8 @@ class Scale:
     def show(self, axis):
         """Signals and comparators of the phase."""
         angle = 2 * math.pi * self.phase[axis]
-        sin, cos = AMPLITUDE * self.gain[axis] * math.sin(angle), AMPLITUDE * math.cos(angle)
+        ahead = angle + 2 * math.pi * self.phase_error[axis]
+        sin, cos = AMPLITUDE * self.gain[axis] * math.sin(ahead), AMPLITUDE * math.cos(angle)
         x, y = self.offset[axis]
         self.node.convert(axis, *(max(min(round(v), 127), -128) for v in (sin + x, cos + y)))
         if self.comparators:
@@ -254,7 +256,7 @@ def test_the_outlier_filter_holds_samples_back_and_counts_them(node, axis):
 @pytest.mark.parametrize("axis", [0, 1])
 def test_the_recorder_stores_samples_or_phases(node, axis):
     scale = Scale(node)
-    scale.turn(axis, 0.125)
+    scale.turn(axis, 0.1)
     sample = node.fields("axis.sample", axis)
     phase = node.read("axis.phase", "phase", axis)
     for point in range(65):  # the phases are taken before the harmonics
@@ -278,6 +280,30 @@ def test_the_recorder_stores_samples_or_phases(node, axis):
     assert words[0] == {(sample["sin"] & 0xFF) << 8 | (sample["cos"] & 0xFF) << 24}
     assert words[1] == {phase << 16 | phase}
     assert words[1, "took"] > 1.5 * words[0, "took"]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_burst_begins_with_the_phase_of_the_next_sample(node, axis):
+    scale = Scale(node)
+    period = 400
+    node.write("node.sample_period", period)
+    node.write("feedback.recorder", decimation=1, phases=1, axis=axis)
+    node.run(3 * period)
+    node.watch("adc_cs_n")
+    node.run(2 * period)
+    converted = [c.cycle for c in node.changes() if c.value >> axis & 1][-1]
+    node.run(converted + period + period // 2 - node.now)  # between two samples
+    node.write("feedback.strobes", record=1, axis=axis)
+    phases = []
+    for _ in range(2):
+        scale.phase[axis] += 0.1
+        scale.show(axis)
+        node.run(period)
+        phases.append(node.read("axis.phase", "phase", axis))
+    node.write("node.sample_period", SAMPLE)
+    while not node.read("feedback.recorder_state", "full", axis):
+        node.run(100 * SAMPLE)
+    assert node.read("feedback.recorder_word", axis=axis) == phases[1] << 16 | phases[0]
 
 
 def test_a_burst_has_its_decimation_advances_with_each_read_and_reports_a_disturbance(node):
@@ -435,25 +461,27 @@ def test_the_limits_of_the_shape_of_the_signals(node, axis):
     settle(node, axis)
     scale.turn(axis, 3)
     assert first(node, axis) == set()
-    for name, change in (
-        ("offset_drift", dict(offset=(25, 0))),
-        ("unbalanced", dict(gain=0.6)),
+    for name, what, good, bad, only in (
+        ("offset_drift", scale.offset, (0, 0), (25, 0), dict(offset=15)),
+        ("unbalanced", scale.gain, 1.0, 0.6, dict(balance=20)),
+        ("not_in_quadrature", scale.phase_error, 0.0, 0.08, dict(quadrature=20)),
     ):
         limits(node, axis)
         settle(node, axis)
-        for what, value in change.items():
-            getattr(scale, what)[axis] = value
+        what[axis] = bad
         scale.turn(axis, 6)
         settle(node, axis)
-        only = {"offset_drift": dict(offset=15), "unbalanced": dict(balance=20)}[name]
         limits(node, axis, **only)
         scale.turn(axis, 2)
         assert first(node, axis) == {name}
-        scale.gain[axis], scale.offset[axis] = 1.0, (0, 0)
+        what[axis] = good
         limits(node, axis)
         scale.turn(axis, 6)
     settle(node, axis)
     limits(node, axis, tolerance=15)
+    scale.gain[axis] = 0.94
+    scale.turn(axis, 1)
+    assert first(node, axis) == set(), "6 counts are allowed"
     scale.gain[axis] = 0.6
     scale.turn(axis, 1)
     assert "off_circle" in first(node, axis)
