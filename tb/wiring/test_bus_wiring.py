@@ -54,6 +54,35 @@ def test_a_frame_for_another_node_does_not_pass(node):
     assert received(node) == [(command_byte(4, FROM_NODE), 1, 0)]
 
 
+def cycles_of_a_read(node):
+    """How long the soft core takes to read a register."""
+    begun = node.now
+    node.read("node.tick_period")
+    return node.now - begun
+
+
+def test_the_soft_core_waits_for_a_time_or_until_a_word_is_received(node):
+    first = cycles_of_a_read(node)  # the registers take their values before
+    bus(node)
+    usual = cycles_of_a_read(node)
+    for cycles in (1000, 2000):
+        node.write("node.wait_time", cycles)
+        assert abs(cycles_of_a_read(node) - cycles) < 4 * usual
+        assert cycles_of_a_read(node) < 2 * usual
+    node.write("node.wait_time", 3900)
+    node.send_frame()
+    assert cycles_of_a_read(node) < 2 * usual, "it is awake"
+    node.write("node.wait_time", 3900)
+    assert cycles_of_a_read(node) < 2 * usual, "there is a word still"
+    received(node)
+    node.write("node.wait_time", 3900)
+    node.set(rst=1)
+    node.run(16)
+    node.set(rst=0)
+    node.run(40)
+    assert abs(cycles_of_a_read(node) - first) < usual, "a reset ends the wait"
+
+
 def test_words_are_sent_with_their_ninth_bit_and_the_driver_on(node):
     bus(node)
     assert node.levels("rs485_tx", "rs485_driver_enable") == (1, 0)

@@ -218,6 +218,26 @@ def test_steps_take_the_backlash_up_at_a_reversal(node, axis):
     assert node.read("actuator.steps", axis=other(axis)) == 0
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_small_motion_back_takes_no_backlash_up(node, axis):
+    node.start()
+    node.write("actuator.drive", 1, axis=axis)
+    node.write("actuator.step_ratio", 40 << 32, axis=axis)
+    node.write("feedback.backlash", 0x8000, axis=axis)
+    node.write("feedback.backlash_rate", value=0, hysteresis=127, axis=axis)
+    node.enable(axis)
+    node.ticks(3)
+    play(node, axis, 0x4000, 4)
+    node.ticks(16)
+    steps = node.read("actuator.steps", axis=axis)
+    node.segment(other(axis), -0x4000, 12)
+    node.segment(axis, -0x400, 20)  # 0x5000 of 0x7F00
+    node.write("node.start_axes", 3)
+    node.ticks(30)
+    assert node.read("axis.target", axis=axis) == 0x10000 - 20 * 0x400
+    assert abs(node.read("actuator.steps", axis=axis) - steps + 12.5) <= 1
+
+
 def test_the_profiles_of_two_axes_start_at_the_same_tick_by_one_write(node):
     node.start()
     for axis in (0, 1):
