@@ -616,6 +616,34 @@ def test_a_pressed_switch_stops_the_steps_into_it(node):
         node.set_bit(pin, axis, 0)
 
 
+def test_a_switch_that_is_pressed_at_a_reversal_stops_the_steps_still_to_come(node):
+    """The steps follow their target one tick later, and so does what a switch lets pass."""
+    node.start()
+    node.write("actuator.drive", 1)
+    node.write("actuator.step_ratio", 40 << 32)
+    node.ticks(3)
+    for wait in range(5 * TICK, 9 * TICK, 190):
+        node.enable(0, homing=3)
+        node.segment(0, 0x4000, 5, last=False)
+        node.segment(0, -0x4000, 5)
+        node.write("axis.strobes", start=1)
+        node.run(wait)
+        node.set_bit("limit_high_open", 0, 1)
+        node.run(660)
+        node.watch("step", "direction")
+        up = node.get("direction") & 1
+        node.ticks(12)
+        for change in node.changes():
+            if change.pin == "direction":
+                up = change.value & 1
+            else:
+                assert not (change.value & 1 and up), wait
+        node.set_bit("limit_high_open", 0, 0)
+        node.run(660)
+        node.write("axis.control", 0)
+        node.ticks(4)
+
+
 @pytest.mark.parametrize("mode, low", [(0, 0), (0, 1), (1, 1), (2, 1)])
 def test_own_steps_are_the_position_of_a_stepper_whatever_its_pins_show(node, mode, low):
     node.start()
