@@ -845,3 +845,18 @@ def test_crossings_of_zero_are_reported_with_their_direction(node, axis):
     node.write("axis.shift_origin", -5, axis=axis)
     node.run(100)
     assert node.bits("axis.zero_crossing", axis) == set(), "a shift is no motion"
+
+
+def test_the_first_position_after_a_reset_crosses_no_zero(node):
+    node.start()
+    for axis in (0, 1):
+        node.count(axis, -6)
+    node.run(200)
+    node.set(rst=1)
+    node.run(16)
+    node.set(rst=0)
+    node.write("node.sample_period", 40)
+    node.run(400)
+    for axis in (0, 1):
+        assert node.read("axis.position", axis=axis) >= 0
+        assert node.bits("axis.zero_crossing", axis) == set()
