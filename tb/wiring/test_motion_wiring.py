@@ -622,7 +622,7 @@ def test_a_switch_that_is_pressed_at_a_reversal_stops_the_steps_still_to_come(no
     node.write("actuator.drive", 1)
     node.write("actuator.step_ratio", 40 << 32)
     node.ticks(3)
-    for wait in range(5 * TICK, 9 * TICK, 190):
+    for wait in range(5 * TICK, 8 * TICK, 380):
         node.enable(0, homing=3)
         node.segment(0, 0x4000, 5, last=False)
         node.segment(0, -0x4000, 5)
@@ -632,7 +632,7 @@ def test_a_switch_that_is_pressed_at_a_reversal_stops_the_steps_still_to_come(no
         node.run(660)
         node.watch("step", "direction")
         up = node.get("direction") & 1
-        node.ticks(12)
+        node.ticks(5)
         for change in node.changes():
             if change.pin == "direction":
                 up = change.value & 1
