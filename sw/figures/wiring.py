@@ -47,8 +47,8 @@ FIGURES = {
         "faults",
         "each port connection of the block diagrams tied to 0, tied to 1, inverted, and swapped "
         "with its neighbour: those that no test of the wiring sees and that have no reason in "
-        "sw/mutation/wiring.toml; an instance whose connections are as they were when its faults "
-        "were run does not run again",
+        "sw/mutation/wiring.toml; a fault that was found does not run again as long as the "
+        "connections of its instance are as they were",
         "0",
         Quick(
             {"seconds": QUICK_S},

@@ -224,16 +224,17 @@ def of_instances(
     jobs: int = 2,
     seconds: float = float("inf"),
     report: Report = silent,
+    due: Callable[[Mutant], bool] = lambda m: True,
 ) -> Iterator[tuple[Place, Verdicts]]:
-    """Run the mutants of diagrams, one build after the other; none is begun after so many seconds.
-    Each instance with its verdicts, as soon as all its mutants have run; at the end those of which
-    some are left.
+    """Run the mutants of diagrams that are due, one build after the other; none is begun after so
+    many seconds. Each instance with its verdicts, as soon as all its mutants have run; at the end
+    those of which some are left.
     """
     end = time.monotonic() + seconds
     for group in together(files):
         design, mutants = Design.of(group, clocks, chosen), list[Mutant]()
         places: dict[Place, Verdicts] = defaultdict(Verdicts)
-        for mutant in design.mutants():
+        for mutant in filter(due, design.mutants()):
             verdicts = places[place_of(mutant.connection)]
             if absent(mutant.connection):
                 judge(verdicts, mutant, "")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/wiring.toml: the instances of the block diagrams whose faults have been run. An instance
-runs again if its connections change, or if it has a survivor without a reason.
+runs again if its connections change, and its survivors without a reason run again.
 
 python -m mutation.wiring_record [FILE …]      runs the instances of these diagrams, or of all, that
                                                are due, and writes them into the record
@@ -20,6 +20,7 @@ from typing import Any
 from campaigns import record
 from mutation import wiring
 from mutation.connections import RTL, diagrams, of_diagram
+from mutation.mutants import Mutant
 
 
 def name_of(place: wiring.Place) -> str:
@@ -71,18 +72,30 @@ def recorded(
     report: wiring.Report = wiring.silent,
 ) -> Iterator[tuple[wiring.Place, wiring.Verdicts]]:
     """Run the instances of diagrams that are due and have this part in their names, and write each
-    into docs/wiring.toml as soon as it is complete, so an interrupted run can go on.
+    into docs/wiring.toml as soon as it is complete, so an interrupted run can go on. Of an instance
+    that has run already only the survivors without a reason run again.
     """
+    entries, unseen = known(), survivors()
     chosen = {place for place in due() if part in name_of(place)}
     files = [file for file in files if any(place[0] == file for place in chosen)]
+
+    def runs(mutant: Mutant) -> bool:
+        place = wiring.place_of(mutant.connection)
+        return place not in unseen or mutant.name in unseen[place]
+
     running = wiring.of_instances(
-        files, lambda c: wiring.place_of(c) in chosen, jobs=jobs, report=report
+        files, lambda c: wiring.place_of(c) in chosen, jobs=jobs, report=report, due=runs
     )
     for place, verdicts in running:
+        found, explained = len(verdicts.killed), len(verdicts.explained)
+        if place in unseen:
+            before = entries[place]
+            found += before["found"]
+            explained += before["explained"] + len(before["survivors"]) - len(unseen[place])
         entry: record.Entry = {
             "connections": instances()[place],
-            "found": len(verdicts.killed),
-            "explained": len(verdicts.explained),
+            "found": found,
+            "explained": explained,
             "survivors": [mutant.name for mutant in verdicts.survivors],
         }
         if not verdicts.stale:

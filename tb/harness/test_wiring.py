@@ -209,12 +209,28 @@ def test_a_survivor_in_the_record_runs_again_until_it_has_a_reason(runs, monkeyp
     dict(wiring_record.recorded([DISPLAY]))
     assert list(wiring_record.survivors().values()) == [[survivor.name]]
     assert wiring_record.summary().splitlines()[1].split()[-1] == "1"
+    faults = len(ran)
     ran.clear()
     dict(wiring_record.recorded([DISPLAY]))
-    assert survivor.name in ran
+    assert ran == [survivor.name], "what has been found does not run again"
+    assert sum(entry["found"] for entry in wiring_record.known().values()) == faults - 1
     monkeypatch.setattr(wiring, "reasons", lambda: {survivor.name: "a reason"})
     assert not wiring_record.due() and not wiring_record.survivors()
     assert wiring_record.summary().splitlines()[1].split()[-2:] == ["1", "0"]
+
+
+def test_a_survivor_that_a_new_test_finds_counts_as_found(runs, monkeypatch):
+    ran, blind = runs
+    first, second = [m for m in Design.of([DISPLAY]).mutants() if not wiring.constant(m)][:2]
+    blind |= {first.name, second.name}
+    dict(wiring_record.recorded([DISPLAY]))
+    faults = len(ran)
+    blind.remove(first.name)
+    monkeypatch.setattr(wiring, "reasons", lambda: {second.name: "a reason"})
+    dict(wiring_record.recorded([DISPLAY]))
+    entries = wiring_record.known().values()
+    assert sum(entry["found"] for entry in entries) == faults - 1
+    assert sum(entry["explained"] for entry in entries) == 1 and not wiring_record.due()
 
 
 def test_an_instance_with_a_stale_reason_does_not_come_into_the_record(runs, monkeypatch):
