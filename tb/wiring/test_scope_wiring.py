@@ -140,22 +140,24 @@ def test_the_command_of_the_fine_stage_is_recorded(node):
     assert words(node, 2)[-1] == tuple(shown) and shown[0] == 0 < shown[1]
 
 
-def test_a_trigger_waits_for_its_signal_and_keeps_samples_from_before(node):
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_trigger_waits_for_its_signal_and_keeps_samples_from_before(node, axis):
     node.start()
     begin(
         node,
-        [("position", 1)],
+        [("position", axis)],
         8,
         every=2,
         earlier=3,
-        trigger=("position", 1),
+        trigger=("position", axis),
         when="rises",
         level=3 * COUNT,
     )
-    node.count(0, 9)
+    for another in {0, 1, 2} - {axis}:
+        node.count(another, 9)
     node.ticks(10)
     assert node.read("node.scope_state", "phase") == WAITING, "the position of another axis"
-    node.count(1, 5)
+    node.count(axis, 5)
     node.ticks(30)
     found = [sample for (sample,) in words(node, 1)]
     assert found == [0] * 3 + [5 * COUNT] * 5
