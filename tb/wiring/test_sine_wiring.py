@@ -301,8 +301,8 @@ def test_a_burst_begins_with_the_phase_of_the_next_sample(node, axis):
         node.run(period)
         phases.append(node.read("axis.phase", "phase", axis))
     node.write("node.sample_period", SAMPLE)
-    while not node.read("feedback.recorder_state", "full", axis):
-        node.run(100 * SAMPLE)
+    node.run(2100 * SAMPLE)
+    assert node.read("feedback.recorder_state", "full", axis)
     assert node.read("feedback.recorder_word", axis=axis) == phases[1] << 16 | phases[0]
 
 
