@@ -250,26 +250,26 @@ def test_the_profiles_of_two_axes_start_at_the_same_tick_by_one_write(node):
     assert node.read("axis.target", axis=0) > 0
 
 
-def test_a_start_of_several_axes_begins_a_tick(node):
-    """The tick is restarted, so that motions of several nodes begin together."""
-    node.write("actuator.dac", half_period=1, refresh=0xFFFF)
+def test_a_sync_pulse_begins_a_tick(node):
+    """So the motions of several nodes begin together."""
     node.start()
+    node.write("bus.bit_time", 256)
+    node.write("bus.sync_axes", 1)
     node.write("feedback.capture_sources", 2)
-    node.write("feedback.strobes", capture_clear=1)
-    node.ticks(2)
-    node.run(TICK // 2)
-    node.write("node.start_axes", 1)
-    node.run(10)
-    node.write("feedback.strobes", capture_clear=1)
-    at = node.now
-    node.ticks(3)
-    times = []
-    for _ in range(2):
-        times.append(node.read("feedback.captured_time"))
-        node.write("feedback.strobes", capture_next=1)
-    assert times[1] - times[0] == TICK
-    assert (times[0] - at) % (1 << 32) < TICK - 10
-    assert (times[0] - at) % (1 << 32) > TICK - 600
+    delays = set()
+    for quarter in range(4):
+        node.run(quarter * TICK // 4)
+        node.send_sync()
+        at = node.now
+        node.write("feedback.strobes", capture_clear=1)
+        node.ticks(3)
+        times = []
+        for _ in range(2):
+            times.append(node.read("feedback.captured_time"))
+            node.write("feedback.strobes", capture_next=1)
+        assert times[1] - times[0] == TICK
+        delays.add((times[0] - at) % (1 << 32))
+    assert len(delays) == 1 and TICK - 300 < delays.pop() < TICK
 
 
 def test_a_sync_pulse_starts_the_axes_that_wait_for_it(node):
