@@ -72,6 +72,15 @@ def test_after_a_reset_all_drives_are_off_until_the_faults_are_reset(node):
 
 
 @pytest.mark.parametrize("axis", [0, 1])
+def test_a_limit_switch_that_opens_for_less_than_a_tenth_of_a_millisecond_stops_nothing(node, axis):
+    both_on(node)
+    for pin in ("limit_low_open", "limit_high_open"):
+        node.pulse(pin, axis, 8 * LIMIT // 10)
+        node.run(LIMIT)
+    assert node.get("drive_enable") == 3 and not node.bits("axis.faults", axis)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
 def test_a_limit_switch_stops_its_axis_and_its_position_is_latched(node, axis):
     both_on(node)
     for end, pin in (("limit_low", "limit_low_open"), ("limit_high", "limit_high_open")):
@@ -194,15 +203,15 @@ def test_an_encoder_fault_stops_its_axis_if_the_mask_says_so(node, axis):
     judge(node, axis, "encoder")
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_a_following_error_stops_its_axis_in_closed_loop(node, axis):
+@pytest.mark.parametrize("axis, loop", [(0, "closed_loop"), (1, "closed_loop"), (0, "fine")])
+def test_a_following_error_stops_its_axis_in_closed_loop(node, axis, loop):
     both_on(node)
     node.write("axis.following_limit", 3 * COUNT, axis=axis)
     node.count(axis, 5)
     node.ticks(4)
     assert node.get("drive_enable") == 3, "the loop is open"
     node.write("axis.strobes", set_target_to_position=1, axis=axis)
-    node.enable(axis, closed_loop=1)
+    node.enable(axis, **{loop: 1})
     node.ticks(4)
     node.count(axis, 2)
     node.ticks(3)
