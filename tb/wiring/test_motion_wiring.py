@@ -22,6 +22,7 @@ def play(node, axis, velocity, ticks):
 def test_the_node_reports_what_it_is(node):
     build = node.fields("node.build")
     assert build == {"axes": 3, "address": 5, "memory": 4, "scope": 1}
+    assert node.fields("peripherals.built") == dict.fromkeys(node.fields("peripherals.built"), 1)
     assert node.read("node.clk_hz") == CLK_HZ
     first = node.now, node.read("node.time_stamp")
     node.run(1000)
@@ -400,6 +401,31 @@ def test_the_filters_of_an_axis_act_on_its_command(node, axis):
         node.write("axis.filter_value", 1, axis=axis)
     node.ticks(4)
     assert node.read("axis.command", axis=axis) == 1000 >> 3
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_integral_rests_while_a_switch_blocks_its_direction(node, axis):
+    node.start()
+    node.write("axis.ki", 1 << 16, axis=axis)  # 256 in each tick, with an error of 4 counts
+    node.write("axis.integral_limit", 0x7FFF, axis=axis)
+    for sign, pin, opposite in (
+        (1, "limit_high_open", "limit_low_open"),
+        (-1, "limit_low_open", "limit_high_open"),
+    ):
+        for pressed, grows in ((pin, False), (opposite, True)):
+            node.write("axis.strobes", set_target_to_position=1, axis=axis)
+            node.enable(axis, closed_loop=1, homing=3)
+            node.set_bit(pressed, axis, 1)
+            node.run(640)
+            node.count(axis, -4 * sign)
+            node.ticks(12)
+            node.set_bit(pressed, axis, 0)
+            node.run(640)
+            node.ticks(2)
+            command = sign * node.read("axis.command", axis=axis)
+            assert (command > 10 * 256) == grows and command > 0
+            node.write("axis.control", 0, axis=axis)
+            node.ticks(2)
 
 
 @pytest.mark.parametrize("axis", [0, 1])
