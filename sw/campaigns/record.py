@@ -44,7 +44,7 @@ def read(path: Path) -> dict[str, dict[str, Any]]:
     return tomllib.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
-def add(name: str, entry: Entry, path: Path = MUTANTS) -> None:
+def add(name: str, entry: Entry, path: Path) -> None:
     """Add the entry of this name, with today's date, in place of an older one."""
     known = read(path)
     known[name] = {"date": date.today(), **entry}

@@ -3,15 +3,17 @@
 campaign over all blocks is `make soak K=mutants`.
 """
 
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from campaigns.campaign import Campaign, Counts
 from figures.common import Figure, Quick, console
 from figures.synthesis import SynthesisError
 from mutation import blocks
 from mutation.block import MutationError
-from mutation.command import ENOUGH
+from mutation.command import ENOUGH, different, words_of
 from twin.build import ROOT
 
 TINY, FEW = "step_permission", 20  # a small block, and some of its mutants
@@ -34,32 +36,33 @@ def verdicts_of(name: str, count: int, seed: int, only: str = "") -> blocks.Verd
         raise SynthesisError(str(error)) from error
 
 
-def verdicts_of_all(tiny: bool, seed: int) -> dict[str, blocks.Verdicts]:
-    """Those of all blocks, or of a tiny one."""
+def entries(tiny: bool, seed: int) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Each block with its entry of docs/mutants.toml, or a tiny one, which is not added there."""
     if not tiny:
-        return {name: verdicts_of(name, blocks.MUTANTS, seed) for name in names()}
+        try:
+            yield from blocks.BLOCKS.recorded(names(), blocks.MUTANTS, seed)
+        except MutationError as error:
+            raise SynthesisError(str(error)) from error
+        return
     planted = verdicts_of(TINY, FEWER, seed, WEAK)
     if not any(survivor.mutant.text for survivor in planted.survivors):
         raise SynthesisError(
             f"{TINY} has no survivors with one of its tests alone: {planted.words}"
         )
-    return {TINY: verdicts_of(TINY, FEW, seed)}
+    yield TINY, blocks.BLOCKS.entry(TINY, verdicts_of(TINY, FEW, seed), FEW, seed)
 
 
 def mutants_killed_pct(tiny: bool = False, seed: int = 1) -> float:
-    killed = different = 0
-    for name, verdicts in verdicts_of_all(tiny, seed).items():
-        console.print(f"{name}: {verdicts.words}")
-        for survivor in verdicts.survivors:
-            console.print(f"  {survivor.text}", markup=False, highlight=False)
-        killed += verdicts.killed
-        different += verdicts.different
-    return 100 * killed / different
+    found = of = 0
+    for name, entry in entries(tiny, seed):
+        console.print(words_of(name, entry), markup=False, highlight=False)
+        found += entry["found"]
+        of += different(entry)
+    return 100 * found / of
 
 
 def mutants_blocks_under_95(tiny: bool = False, seed: int = 1) -> float:
-    found = verdicts_of_all(tiny, seed)
-    under = [name for name, verdicts in found.items() if verdicts.percent < ENOUGH]
+    under = [n for n, e in entries(tiny, seed) if 100 * e["found"] < ENOUGH * different(e)]
     console.print(f"under {ENOUGH} %: {', '.join(under) or 'none'}")
     return float(len(under))
 
@@ -73,7 +76,8 @@ FIGURES = {
         mutants_killed_pct,
         "%",
         "of 1 000 mutants of each block that its tests see, of those that are not proved to be "
-        "equivalent; a mutant with a reason is one that they do not see",
+        "equivalent; a mutant with a reason is one that they do not see, and a block whose source "
+        "has not changed since is not run again",
         ">= 97",
         SHORT,
         1,

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of the mutation of host and firmware: how many faults inside their sources tests see."""
 
+from collections.abc import Iterator, Mapping
 from functools import partial
+from typing import Any
 
 from figures.common import Absent, Figure, Quick, console
+from mutation.command import different, words_of
 from mutation.firmware import C
 from mutation.host import PYTHON
 from mutation.sources import MUTANTS, Language, NotInstalled
@@ -12,22 +15,28 @@ FEW = 10  # mutants of a small source
 OF_FIRMWARE = 25  # mutants of each source of the firmware, which has six times as many sources
 
 
-def killed_pct(
-    language: Language, count: int, sources: tuple[str, ...] = (), seed: int = 1
-) -> float:
-    """Of these sources, or of all that have tests in the table of the language."""
-    killed = tried = 0
-    for name in sources or sorted(language.tests()):
-        try:
-            verdicts = language.measured(name, count, seed)
-        except NotInstalled as error:
-            raise Absent(str(error)) from error
-        console.print(f"{name}: {verdicts.words}")
-        for mutant in verdicts.survivors:
-            console.print(f"  {mutant.words}", markup=False, highlight=False)
-        killed += verdicts.killed
-        tried += verdicts.tried
-    return 100 * killed / tried
+def entries(
+    language: Language, count: int, small: str | None, seed: int
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Each source with its entry of docs/mutants.toml, or a small one, which is not added there."""
+    subjects = language.subjects
+    if small:
+        verdicts = language.measured(small, count, seed)
+        yield small, subjects.entry(small, verdicts, count, seed)
+    else:
+        yield from subjects.recorded(sorted(subjects.names()), count, seed)
+
+
+def killed_pct(language: Language, count: int, small: str | None = None, seed: int = 1) -> float:
+    found = tried = 0
+    try:
+        for name, entry in entries(language, count, small, seed):
+            console.print(words_of(name, entry), markup=False, highlight=False)
+            found += entry["found"]
+            tried += different(entry)
+    except NotInstalled as error:
+        raise Absent(str(error)) from error
+    return 100 * found / tried
 
 
 def figure(language: Language, count: int, small: str, words: str, bound: str) -> Figure:
@@ -35,9 +44,9 @@ def figure(language: Language, count: int, small: str, words: str, bound: str) -
     return Figure(
         partial(killed_pct, language, count=count),
         "%",
-        f"of {count} mutants of each {words}",
+        f"of {count} mutants of each {words}; a source that has not changed since is not run again",
         bound,
-        Quick({"sources": (small,), "count": FEW}, f"{FEW} mutants of {small}", ""),
+        Quick({"small": small, "count": FEW}, f"{FEW} mutants of {small}", ""),
         1,
     )
 

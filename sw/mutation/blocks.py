@@ -225,7 +225,7 @@ class Builds:
 def judge(block: str, runs: Runs, looks: Runs = ()) -> Verdicts:
     """The verdicts of the runs of a block."""
     verdicts, met = Verdicts(), dict[Reason, bool]()  # whether it is needed
-    source = next((ROOT / "rtl").rglob(f"{block}.sv"))
+    source = path_of(block)
     builds = Builds(block, runs, looks)
     for folder, results in builds.results.items():
         path, words = Path(folder), build_words(builds.parameters[folder])
@@ -312,14 +312,22 @@ def named(block: str, count: int, seed: int) -> Verdicts:
         raise MutationError(f"{block}: {error}") from error
 
 
+def path_of(block: str) -> Path:
+    """The source of a block."""
+    return next((ROOT / "rtl").rglob(f"{block}.sv"))
+
+
+BLOCKS = command.Subjects(
+    tests, "is no block that a test simulates by itself", path_of, named, entry_of
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m mutation.blocks")
     parser.add_argument(
         "names", nargs="*", metavar="BLOCK", help="modules below rtl/ with a test; default: all"
     )
-    unknown = "is no block that a test simulates by itself"
-    measure = named
-    return command.run(parser, arguments, tests(), unknown, MUTANTS, measure, entry_of)
+    return command.run(parser, arguments, BLOCKS, MUTANTS)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line of a mutation test of blocks or modules, one after the other."""
+"""Mutation tests of blocks or sources, one after the other: their record and their command line."""
 
 import argparse
+import hashlib
 import sys
-from collections.abc import Callable, Collection, Sequence
-from typing import Protocol, TypeVar
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
 
 from campaigns import record
 from mutation.block import MutationError
@@ -29,11 +32,11 @@ def summary(known: Collection[str]) -> str:
     tests see too few, and those of which none have been run.
     """
     entries = {n: e for n, e in record.read(record.MUTANTS).items() if n in known}
-    different = {name: entry["mutants"] - entry["equivalent"] for name, entry in entries.items()}
-    found, of = sum(entry["found"] for entry in entries.values()), sum(different.values())
+    of = sum(map(different, entries.values()))
+    found = sum(entry["found"] for entry in entries.values())
     survivors = sum(len(entry["survivors"]) for entry in entries.values())
     explained = sum(len(entry["explained"]) for entry in entries.values())
-    under = [n for n, e in entries.items() if 100 * e["found"] < ENOUGH * different[n]]
+    under = [n for n, e in entries.items() if 100 * e["found"] < ENOUGH * different(e)]
     missing = sorted(set(known) - set(entries))
     return "\n".join(
         (
@@ -45,18 +48,69 @@ def summary(known: Collection[str]) -> str:
     )
 
 
+@dataclass(frozen=True)
+class Subjects(Generic[V]):
+    """The blocks or sources of one kind, and how their mutants are run."""
+
+    names: Callable[[], Collection[str]]
+    unknown: str  # what is said of another name
+    path_of: Callable[[str], Path]
+    measured: Callable[[str, int, int], V]  # of a name, so many mutants, by a seed
+    entry_of: Callable[[V, int, int], record.Entry]
+
+    def source(self, name: str) -> str:
+        """A hash of the source."""
+        return hashlib.sha256(self.path_of(name).read_bytes()).hexdigest()[:12]
+
+    def entry(self, name: str, verdicts: V, count: int, seed: int) -> dict[str, Any]:
+        """What the record says of these verdicts."""
+        return {"source": self.source(name), **self.entry_of(verdicts, count, seed)}
+
+    def known(self, name: str, count: int) -> dict[str, Any] | None:
+        """The entry of the record that has so many mutants of the source as it is, if there is one.
+        They are those of the first seed.
+        """
+        entry = record.read(record.MUTANTS).get(name)
+        if not entry or entry["asked"] < count or entry["seed"] != 1:
+            return None
+        return entry if entry.get("source") == self.source(name) else None
+
+    def recorded(
+        self, names: Iterable[str], count: int, seed: int = 1
+    ) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        """Each name with its entry. What the record does not have is run and added to it, so that
+        an interrupted run can go on; but with another seed all are run and nothing is added.
+        """
+        for name in names:
+            entry = self.known(name, count) if seed == 1 else None
+            if entry is None:
+                entry = self.entry(name, self.measured(name, count, seed), count, seed)
+                if seed == 1:
+                    record.add(name, entry, record.MUTANTS)
+            yield name, entry
+
+
+def different(entry: Mapping[str, Any]) -> int:
+    """The mutants of an entry that are not proved to be equivalent."""
+    return int(entry["mutants"] - entry["equivalent"])
+
+
+def words_of(name: str, entry: Mapping[str, Any]) -> str:
+    """An entry in some lines: its numbers, and the survivors."""
+    numbers = f"{name}: {entry['found']} of {different(entry)} found"
+    return "\n  ".join([numbers, *entry["survivors"]])
+
+
 def run(
     parser: argparse.ArgumentParser,
     arguments: Sequence[str] | None,
-    known: Collection[str],
-    unknown: str,  # what is said of another name
+    subjects: Subjects[V],
     mutants: int,  # of each, unless the command line says it
-    measured: Callable[[str, int, int], V],
-    entry_of: Callable[[V, int, int], record.Entry],
 ) -> int:
-    """Measure those that the first argument of the parser names, or all that are known; the exit
+    """Run the mutants of those that the first argument of the parser names, or of all; the exit
     code is 1 if anything survives, a reason is stale, or one cannot be measured.
     """
+    known = subjects.names()
     parser.add_argument("--list", action="store_true", help="print the names, run nothing")
     parser.add_argument(
         "--summary", action="store_true", help="print what docs/mutants.toml has, run nothing"
@@ -67,7 +121,7 @@ def run(
     options = parser.parse_args(arguments)
     names = options.names or sorted(known)
     if others := set(names) - set(known):
-        parser.error(f"{sorted(others)[0]} {unknown}")
+        parser.error(f"{sorted(others)[0]} {subjects.unknown}")
     if options.list:
         print(*names, sep="\n")
         return 0
@@ -77,14 +131,13 @@ def run(
     wrong = 0
     for name in names:
         try:
-            verdicts = measured(name, options.count, options.seed)
+            verdicts = subjects.measured(name, options.count, options.seed)
         except MutationError as error:
             print(error, file=sys.stderr, flush=True)
             wrong += 1
             continue
-        entry = entry_of(verdicts, options.count, options.seed)
+        entry = subjects.entry(name, verdicts, options.count, options.seed)
         survivors = entry["survivors"]
-        assert isinstance(survivors, list)
         print(f"{name}: {verdicts.words}", flush=True)
         for survivor in survivors:
             print(f"  {survivor}", flush=True)
@@ -92,5 +145,5 @@ def run(
             print(f"  stale reason: {line}", flush=True)
         wrong += len(survivors) + len(verdicts.stale)
         if options.record:
-            record.add(name, entry)
+            record.add(name, entry, record.MUTANTS)
     return int(wrong > 0)

@@ -219,15 +219,19 @@ class Language:
         ]
         return verdicts
 
+    @property
+    def subjects(self) -> command.Subjects[Verdicts]:
+        """The sources, for the record and the command line."""
+        unknown = f"has no tests in {self.table.relative_to(ROOT)}"
+        return command.Subjects(self.tests, unknown, self.path_of, self.measured, entry_of)
+
     def main(self, arguments: Sequence[str] | None = None) -> int:
         """The command line of a mutation test of such sources; returns its exit code."""
         parser = argparse.ArgumentParser(prog=f"python -m mutation.{self.name}")
         parser.add_argument(
             "names", nargs="*", metavar="SOURCE", help=f"of {self.table.name}; default: all"
         )
-        unknown = f"has no tests in {self.table.relative_to(ROOT)}"
-        known, measure = self.tests(), self.measured
-        return command.run(parser, arguments, known, unknown, MUTANTS, measure, entry_of)
+        return command.run(parser, arguments, self.subjects, MUTANTS)
 
 
 def drawn(places: Mapping[Place, list[Fault]], draw: random.Random) -> Iterator[Fault]:

@@ -172,6 +172,58 @@ def test_the_request_of_another_block_is_refused(tmp_path):
         of_mutants(tmp_path / "request", source_of("time_stamp"), {"W": 4}, "x")
 
 
+@pytest.fixture
+def subjects(tmp_path, monkeypatch):
+    """Two blocks and a record of their own, and what was measured since."""
+    path, ran = tmp_path / "mutants.toml", []
+    monkeypatch.setattr(record, "MUTANTS", path)
+    monkeypatch.setitem(record.HEADS, path, "# a record\n")
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.sv").write_text(name)
+
+    def measured(name, count, seed):
+        ran.append((name, count, seed))
+        return name
+
+    def entry_of(verdicts, count, seed):
+        numbers = dict(mutants=count, asked=count, found=count - 3, equivalent=1, seed=seed)
+        return {**numbers, "survivors": [f"{verdicts}.sv:7: a fault"]}
+
+    made = command.Subjects(
+        lambda: ("one", "two"), "?", lambda n: tmp_path / f"{n}.sv", measured, entry_of
+    )
+    return made, ran
+
+
+def test_what_the_record_has_is_not_run_again_until_the_source_changes(subjects, tmp_path):
+    made, ran = subjects
+    assert [name for name, _ in made.recorded(made.names(), 10)] == ["one", "two"]
+    assert ran == [("one", 10, 1), ("two", 10, 1)]
+    ran.clear()
+    entries = dict(made.recorded(made.names(), 8))
+    assert not ran and entries["two"]["found"] == 7, "it has more than these"
+    assert command.words_of("two", entries["two"]).splitlines() == [
+        "two: 7 of 9 found",
+        "  two.sv:7: a fault",
+    ]
+    dict(made.recorded(made.names(), 20))
+    assert ran == [("one", 20, 1), ("two", 20, 1)], "and here fewer"
+    ran.clear()
+    (tmp_path / "two.sv").write_text("another text")
+    dict(made.recorded(made.names(), 20))
+    assert ran == [("two", 20, 1)]
+
+
+def test_an_interrupted_run_of_mutants_goes_on_and_another_seed_is_not_recorded(subjects):
+    made, ran = subjects
+    next(made.recorded(made.names(), 10))
+    dict(made.recorded(made.names(), 10))
+    assert ran == [("one", 10, 1), ("two", 10, 1)]
+    ran.clear()
+    assert dict(made.recorded(["one"], 10, seed=2))["one"]["seed"] == 2
+    assert ran == [("one", 10, 2)] and made.known("one", 10)["seed"] == 1
+
+
 def test_the_summary_of_the_record_adds_up_and_names_what_is_missing(tmp_path, monkeypatch):
     path = tmp_path / "mutants.toml"
     monkeypatch.setattr(record, "MUTANTS", path)
