@@ -81,6 +81,7 @@ def test_a_profile_moves_the_target_of_its_axis_at_the_ticks(node, axis):
 
 OFF, PREPARED, STREAMING, EXTRAPOLATING, ENDED = range(5)
 RELEASED, STOPPED, LATE, FAULT = 1, 2, 3, 4
+TOO_LATE, OUT_OF_TRAVEL = 1, 3
 
 
 def stream(node, axis, ticks=200):
@@ -133,6 +134,26 @@ def test_an_axis_follows_set_points_until_it_is_released(node, axis):
     assert node.read("axis.stream_state", "mode", axis) == OFF
     assert node.read("axis.stream_state", "ended", axis) == RELEASED
     assert not node.bits("axis.faults", axis)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_stream_has_room_for_16_set_points_and_says_why_it_refuses_one(node, axis):
+    node.start()
+    node.enable(axis)
+    node.ticks(2)
+    stream(node, axis)
+    assert node.read("axis.stream_state", "room", axis) == 16
+    first = node.read("node.tick_count") + 40
+    for number in range(4):
+        set_point(node, axis, first + 4 * number, 1000 * number, 250)
+    assert 10 <= node.read("axis.stream_state", "room", axis) <= 13
+    assert node.read("axis.stream_state", "refusal", axis) == 0
+    set_point(node, axis, first, 0)
+    assert node.read("axis.stream_state", "refusal", axis) == TOO_LATE
+    set_point(node, axis, first + 20, 1 << 31)
+    assert node.read("axis.stream_state", "refusal", axis) == OUT_OF_TRAVEL
+    assert node.fields("axis.stream_counts", axis) == {"accepted": 4, "late": 1, "refused": 1}
+    assert node.read("axis.stream_state", "refusal", other(axis)) == 0
 
 
 @pytest.mark.parametrize("axis", [0, 1])
