@@ -99,6 +99,7 @@ def test_the_index_is_found_as_it_is_set_and_latches(node, axis):
     node.count(axis, -2)
     node.run(60)
     assert node.read("feedback.index_count", axis=axis) == 6
+    assert node.read("axis.quadrature_count", axis=axis) == 4, "the count goes on"
     assert node.read("feedback.capture_state", "present", axis) == 1
     assert node.read("feedback.captured_position", axis=axis) == 6 * COUNT
     assert node.read("feedback.captured", "sources", axis) == 1
@@ -141,15 +142,18 @@ def test_the_edges_level_and_gate_of_the_index_are_settings(node, axis):
                 seen.append((node.get("encoder_b") >> axis & 1, node.get("encoder_a") >> axis & 1))
         gated[settings["gate_mask"]] = sorted(seen)
     assert gated == {1: [(0, 1), (1, 1)], 2: [(1, 0), (1, 1)], 3: [(0, 0)]}
-    node.write("feedback.index", up=1, down=1, each=1, active_low=1, axis=axis)
-    node.run(20)
-    node.write("feedback.index_events", 3, axis=axis)
-    node.set_bit("encoder_z", axis, 1)
-    node.run(20)
-    assert "found" not in node.bits("feedback.index_events", axis)
-    node.set_bit("encoder_z", axis, 0)
-    node.run(20)
-    assert "found" in node.bits("feedback.index_events", axis)
+    for low in (0, 1):
+        node.write("feedback.index", up=1, down=1, each=1, active_low=low, axis=axis)
+        node.set_bit("encoder_z", axis, low)
+        node.run(20)
+        node.write("feedback.index_events", 3, axis=axis)
+        node.set_bit("encoder_z", axis, 1 - low)
+        node.run(20)
+        assert "found" in node.bits("feedback.index_events", axis)
+        node.write("feedback.index_events", 3, axis=axis)
+        node.set_bit("encoder_z", axis, low)
+        node.run(20)
+        assert "found" not in node.bits("feedback.index_events", axis)
 
 
 @pytest.mark.parametrize("axis", [0, 1])

@@ -198,6 +198,9 @@ def test_an_encoder_fault_stops_its_axis_if_the_mask_says_so(node, axis):
     assert node.get("drive_enable") == 3
     assert node.bits("axis.encoder_events", axis) == {"illegal_edge"}
     assert not node.bits("axis.encoder_events", other(axis))
+    node.write("axis.encoder_events", 63, axis=axis)
+    node.run(20)
+    assert not node.bits("axis.encoder_events", axis), "there is no new one"
     node.write("axis.encoder_fault_mask", 1, axis=axis)
     jump()
     judge(node, axis, "encoder")
