@@ -41,9 +41,12 @@ DESIGNS = {  # diagrams of a design; all others are in the node
     "display_port": ("display_port.sv",),
 }
 MOST = 400  # connections of several diagrams in one build
-ABSENT = {
-    "node": ("g_serial_core.", "g_link.g_udp.", "g_link.g_spi.")
-}  # instances that a design does not have
+ABSENT = {  # instances that a design does not have, and ports for a carrier that it does not have
+    "node": (
+        *("g_serial_core.", "g_link.g_udp.", "g_link.g_spi.", "u_link.udp_"),
+        *("u_link.link_cs_n", "u_link.link_sclk", "u_link.link_mosi", "u_link.link_miso"),
+    )
+}
 ZERO = re.compile(r"(\d*'[bdh]?0+|0)")
 ONE = re.compile(r"(1'b1|1'd1)")
 Place = tuple[Path, str]  # a diagram and an instance in it
@@ -56,10 +59,11 @@ def design_of(file: Path) -> str:
 
 
 def absent(connection: Connection) -> bool:
-    """Whether the design in which a diagram is tested does not have this instance: no test can find
-    its faults, which are not run.
+    """Whether the design in which a diagram is tested has nothing behind this connection: no test
+    can find its faults, which are not run.
     """
-    return connection.instance.startswith(ABSENT.get(design_of(connection.file), ()))
+    port = f"{connection.instance}.{connection.port}"
+    return port.startswith(ABSENT.get(design_of(connection.file), ()))
 
 
 @cache
