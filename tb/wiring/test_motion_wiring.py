@@ -230,15 +230,22 @@ def test_a_stream_ends_in_a_stop_and_needs_a_drive(node):
     assert node.read("axis.stream_state", "ended") == FAULT
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_steps_take_the_backlash_up_at_a_reversal(node, axis):
+def stepper_with_backlash(node, axis, hysteresis):
+    """A stepper with 40 steps in a period and half a period of backlash, on; hysteresis in 2^-8
+    period.
+    """
     node.start()
     node.write("actuator.drive", 1, axis=axis)
     node.write("actuator.step_ratio", 40 << 32, axis=axis)
     node.write("feedback.backlash", 0x8000, axis=axis)
-    node.write("feedback.backlash_rate", value=0, hysteresis=1, axis=axis)
+    node.write("feedback.backlash_rate", value=0, hysteresis=hysteresis, axis=axis)
     node.enable(axis)
     node.ticks(3)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_steps_take_the_backlash_up_at_a_reversal(node, axis):
+    stepper_with_backlash(node, axis, hysteresis=1)
     steps = []
     for velocity in (0x4000, -0x4000, -0x4000):
         before = node.read("actuator.steps", axis=axis)
@@ -251,13 +258,7 @@ def test_steps_take_the_backlash_up_at_a_reversal(node, axis):
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_small_motion_back_takes_no_backlash_up(node, axis):
-    node.start()
-    node.write("actuator.drive", 1, axis=axis)
-    node.write("actuator.step_ratio", 40 << 32, axis=axis)
-    node.write("feedback.backlash", 0x8000, axis=axis)
-    node.write("feedback.backlash_rate", value=0, hysteresis=127, axis=axis)
-    node.enable(axis)
-    node.ticks(3)
+    stepper_with_backlash(node, axis, hysteresis=127)
     play(node, axis, 0x4000, 4)
     node.ticks(16)
     steps = node.read("actuator.steps", axis=axis)
