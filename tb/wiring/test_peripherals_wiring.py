@@ -370,3 +370,16 @@ def test_status_inputs_are_filtered_and_their_changes_kept(peripherals):
         assert peripherals.read("edm_status") == none | {f"rose_{bit}": 1, f"fell_{bit}": 1}
         peripherals.write("edm_status", rose_0=1, rose_1=1, fell_0=1, fell_1=1)
         assert peripherals.read("edm_status") == none
+
+
+def test_a_reset_of_a_node_ends_what_its_peripherals_send(node):
+    node.write("peripherals.peer_bit_time", 16 * 100)
+    for byte in (0, 1):
+        node.write("peripherals.peer_transmit", byte)
+    node.run(300)
+    assert node.get("peer_tx") == 0
+    node.set(rst=1)
+    node.run(4)
+    assert node.get("peer_tx") == 1
+    node.set(rst=0)
+    assert node.fields("peripherals.peer_state") == {"transmit_free": 64, "sending": 0}
