@@ -8,6 +8,7 @@ the chain that axes can share, and captures the index alone. Axis 2 only counts,
 from moire.bus.protocol import NINTH, TO_NODE, command_byte, frame, sync_words
 from moire.made.registers import FIELDS
 from mutation.library import MAILBOX, PROGRAM, Bench, library
+from tb.wiring.devices import Devices
 
 CLK_HZ = 6_200_000  # for three axes with filters
 TICK = 1550  # cycles, 4000 Hz
@@ -61,12 +62,13 @@ GRAY = (0b00, 0b01, 0b11, 0b10)  # {b, a} of a scale that moves up
 BIT = 16  # cycles of a bit of the bus in these tests
 
 
-class Node(Bench):
+class Node(Devices, Bench):
     """The node after its reset."""
 
     def __init__(self, path=None, mutant=(0, 0, 0)):
         super().__init__(path or library(TOP, PARAMETERS), mutant)
         self.counts = [0, 0, 0]
+        self.connect(CLK_HZ)
         self.load([*PROGRAM, *[0] * (MAILBOX + 4 - len(PROGRAM))])
         self.set(rst=1, address=5, **IDLE)
         self.run(16)

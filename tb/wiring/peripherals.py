@@ -3,8 +3,7 @@
 
 from moire.made.registers import FIELDS
 from mutation.library import Bench, library
-from tb.peripheral.eeprom_24aa128 import Eeprom
-from tb.peripheral.ps2_lines import Host, Keyboard
+from tb.wiring.devices import Devices
 
 TOP = "peripherals"
 CLK_HZ = 2_000_000  # so that a pulse of one cycle is a glitch
@@ -18,14 +17,12 @@ for _field in FIELDS:
 LINES = ("i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data", "edm_clock", "edm_data")
 
 
-class Peripherals(Bench):
-    """The block after its reset. Devices take part while they are in `active`."""
+class Peripherals(Devices, Bench):
+    """The block after its reset."""
 
     def __init__(self, path=None, mutant=(0, 0, 0)):
         super().__init__(path or library(TOP, PARAMETERS), mutant)
-        self.eeprom, self.keyboard = Eeprom(write_clk=5 * MS), Keyboard(CLK_HZ)
-        self.machine, self.stuck = Host(CLK_HZ), (0, 0)
-        self.active = set()
+        self.connect(CLK_HZ)
         self.set(**dict.fromkeys(LINES, 1))
         self.reset()
         self.run(10)
@@ -37,31 +34,6 @@ class Peripherals(Bench):
         self.set(rst=1, peer_rx=level, sensor_rx=level)
         self.run(4)
         self.set(rst=0)
-
-    def clk(self, cycles=1):
-        """So many cycles, with the active devices."""
-        if not self.active:
-            self.run(cycles)
-            return
-        for _ in range(cycles):
-            self.run(1)
-            if "eeprom" in self.active:
-                e = self.eeprom
-                pulls = self.get("i2c_scl_low"), self.get("i2c_sda_low")
-                devices = (e.scl_low > 0, e.sda_low)
-                lines = [
-                    int(not (own or device or stuck))
-                    for own, device, stuck in zip(pulls, devices, self.stuck)
-                ]
-                e.step(*lines)
-                self.set(i2c_scl=lines[0], i2c_sda=lines[1])
-            for device, name in ((self.keyboard, "keyboard"), (self.machine, "edm")):
-                if name in self.active:
-                    device.step(
-                        1 - (self.get(f"{name}_clock_low") | device.clock_low),
-                        1 - (self.get(f"{name}_data_low") | device.data_low),
-                    )
-                    self.set(**{f"{name}_clock": device.clock, f"{name}_data": device.data})
 
     def until(self, condition, cycles=150 * MS):
         """Run until a condition holds."""

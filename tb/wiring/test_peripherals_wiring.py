@@ -3,6 +3,7 @@
 
 from tb.peripheral.angle_frame import frame
 from tb.peripheral.i2c_master import NO_BUS, NOT_ACKNOWLEDGED, OK, READ, START, STOP, WRITE
+from tb.wiring.node import CLK_HZ
 from tb.wiring.peripherals import BIT, MS, REGISTERS
 
 CUT = [0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14]  # S4: left Ctrl + W
@@ -332,6 +333,20 @@ def test_an_angle_its_age_and_its_number_are_read(peripherals):
     assert REGISTERS["sensor_reading"]["value"].width == 64
 
 
+def shown(changes):
+    """The words that a display takes, in the changes of its pins."""
+    level, words, bits = dict(display_cs_n=1, display_sclk=0, display_data=0), [], []
+    for change in changes:
+        level[change.pin] = change.value
+        if change.pin == "display_sclk" and change.value:
+            assert not level["display_cs_n"]
+            bits.append(level["display_data"])
+        if change.pin == "display_cs_n" and change.value:
+            words.append(int("".join(map(str, bits)), 2))
+            bits = []
+    return words
+
+
 def test_words_reach_the_display(peripherals):
     words = [0x0C01, 0x9630]
     assert peripherals.read("display_state") == dict(free=16, sending=0)
@@ -341,16 +356,7 @@ def test_words_reach_the_display(peripherals):
     state = peripherals.read("display_state")
     assert state["sending"] == 1 and state["free"] < 16
     peripherals.clk(400)
-    level, shown, bits = dict(display_cs_n=1, display_sclk=0, display_data=0), [], []
-    for change in peripherals.changes():
-        level[change.pin] = change.value
-        if change.pin == "display_sclk" and change.value:
-            assert not level["display_cs_n"]
-            bits.append(level["display_data"])
-        if change.pin == "display_cs_n" and change.value:
-            shown.append(int("".join(map(str, bits)), 2))
-            bits = []
-    assert shown == words
+    assert shown(peripherals.changes()) == words
     assert peripherals.read("display_state") == dict(free=16, sending=0)
 
 
@@ -370,6 +376,69 @@ def test_status_inputs_are_filtered_and_their_changes_kept(peripherals):
         assert peripherals.read("edm_status") == none | {f"rose_{bit}": 1, f"fell_{bit}": 1}
         peripherals.write("edm_status", rose_0=1, rose_1=1, fell_0=1, fell_1=1)
         assert peripherals.read("edm_status") == none
+
+
+# ------------------------------------------------------------------ the peripherals of a node
+
+
+def test_bytes_go_from_a_node_into_the_eeprom_and_come_back(node):
+    """The clock line is low until all commands are in the queue: an access takes some bits."""
+    node.active = {"eeprom"}
+    head = [(START, 0), (WRITE, 0xA0), (WRITE, 0x12), (WRITE, 0x40)]
+    back = [(START, 0), (WRITE, 0xA1), (READ, 1), (READ, 0), (STOP, 0)]
+    node.eeprom.memory[0x1241:0x1243] = bytes([0x3A, 0])
+    for commands in ([*head, (WRITE, 0x96), (STOP, 0)], [*head, *back]):
+        node.set(i2c_scl=0)
+        for command, value in commands:
+            named = {"acknowledge": value} if command == READ else {"data": value}
+            node.write("peripherals.i2c", command=command, **named)
+        node.clk(12_000)
+        assert not node.read("peripherals.i2c_state", "busy")
+        answers = [node.fields("peripherals.i2c_answer") for _ in commands]
+        assert {answer["result"] for answer in answers} == {OK}
+        node.clk(node.eeprom.write_clk + 100)
+    assert node.eeprom.memory[0x1240] == 0x96
+    assert [answer["data"] for answer in answers[6:8]] == [0x96, 0x3A]
+
+
+def test_keys_and_commands_pass_through_a_node(node):
+    node.active = {"keyboard", "edm"}
+    node.keyboard.outbox = [0x1C, 0xF0, 0x1C]
+    node.clk(50_000)
+    assert node.machine.received == [0x1C, 0xF0, 0x1C]
+    node.machine.orders = [0xED]
+    node.clk(50_000)
+    assert node.keyboard.commands == [0xED] and node.machine.received[3:] == [0xFA]
+    assert not node.bits("peripherals.ps2_errors")
+
+
+def test_a_node_talks_to_its_peer_and_hears_its_sensor(node):
+    for port in ("peer", "sensor"):
+        node.write(f"peripherals.{port}_bit_time", 16 * BIT)
+    node.watch("peer_tx")
+    node.write("peripherals.peer_transmit", 0x5A)
+    node.run(20 * BIT)
+    assert node.characters("peer_tx", node.changes()) == [0x5A]
+    node.character("peer_rx", 0xA5)
+    node.run(10)
+    assert node.fields("peripherals.peer_receive") == {"data": 0xA5, "present": 1}
+    for byte in frame(7, 0x89ABCDEF):
+        node.character("sensor_rx", byte)
+    node.run(10)
+    assert node.read("peripherals.sensor_reading") & 0xFFFFFFFF == 0x89ABCDEF
+    assert not node.bits("peripherals.sensor_errors")
+
+
+def test_a_node_shows_words_and_hears_status_inputs(node):
+    node.write("peripherals.edm_filter", 1)
+    node.watch("display_cs_n", "display_sclk", "display_data")
+    node.write("peripherals.display", 0x9630)
+    node.run(2000)
+    assert shown(node.changes()) == [0x9630]
+    for inputs in (1, 2, 0):
+        node.set(edm_status=inputs)
+        node.run(5 * CLK_HZ // 1000)
+        assert node.read("peripherals.edm_status", "inputs") == inputs
 
 
 def test_a_reset_of_a_node_ends_what_its_peripherals_send(node):
