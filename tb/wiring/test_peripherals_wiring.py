@@ -410,6 +410,13 @@ def test_keys_and_commands_pass_through_a_node(node):
     node.clk(50_000)
     assert node.keyboard.commands == [0xED] and node.machine.received[3:] == [0xFA]
     assert not node.bits("peripherals.ps2_errors")
+    node.active = {"keyboard"}
+    node.set(edm_clock=0)
+    node.keyboard.outbox = [0x2B]
+    node.clk(20_000)
+    node.active = {"keyboard", "edm"}
+    node.clk(20_000)
+    assert node.machine.received[4:] == [0x2B], "it waits while the machine holds the clock"
 
 
 def test_a_node_talks_to_its_peer_and_hears_its_sensor(node):
