@@ -28,7 +28,7 @@ from twin.build import ROOT
 NAME = "seeds"
 SEEDS = 10
 AT_ONCE = 2
-STARTS_WORKERS = ("soak_failures", "study_scaling", "seeds_failed")  # of Dask, by themselves
+STARTS_WORKERS = ("soak_failures", "study_scaling", "seeds_failed")  # processes of their own
 SHORT = ("acquire_nm_p95_64", "s1_k3_arcsec")
 
 
