@@ -230,15 +230,15 @@ def test_a_stream_ends_in_a_stop_and_needs_a_drive(node):
     assert node.read("axis.stream_state", "ended") == FAULT
 
 
-def stepper_with_backlash(node, axis, hysteresis):
+def stepper_with_backlash(node, axis, hysteresis, rate=0):
     """A stepper with 40 steps in a period and half a period of backlash, on; hysteresis in 2^-8
-    period.
+    period, rate in 2^-16 period/tick.
     """
     node.start()
     node.write("actuator.drive", 1, axis=axis)
     node.write("actuator.step_ratio", 40 << 32, axis=axis)
     node.write("feedback.backlash", 0x8000, axis=axis)
-    node.write("feedback.backlash_rate", value=0, hysteresis=hysteresis, axis=axis)
+    node.write("feedback.backlash_rate", value=rate, hysteresis=hysteresis, axis=axis)
     node.enable(axis)
     node.ticks(3)
 
@@ -254,6 +254,19 @@ def test_steps_take_the_backlash_up_at_a_reversal(node, axis):
         steps.append(node.read("actuator.steps", axis=axis) - before)
     assert steps[1:] == [-60, -40], "20 more in the first motion back"
     assert node.read("actuator.steps", axis=other(axis)) == 0
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_backlash_is_taken_up_at_its_rate(node, axis):
+    stepper_with_backlash(node, axis, hysteresis=1, rate=0x1000)  # in eight ticks
+    play(node, axis, 0x4000, 4)
+    node.ticks(16)
+    before = node.read("actuator.steps", axis=axis)
+    play(node, axis, -0x4000, 2)
+    node.ticks(6)
+    assert before - node.read("actuator.steps", axis=axis) < 33
+    node.ticks(10)
+    assert before - node.read("actuator.steps", axis=axis) == 20 + 20
 
 
 @pytest.mark.parametrize("axis", [0, 1])

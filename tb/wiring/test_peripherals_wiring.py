@@ -442,6 +442,7 @@ def test_a_node_shows_words_and_hears_status_inputs(node):
     node.write("peripherals.display", 0x9630)
     node.run(2000)
     assert shown(node.changes()) == [0x9630]
+    assert not node.get("display_sclk"), "it rests low"
     for inputs in (1, 2, 0):
         node.set(edm_status=inputs)
         node.run(5 * CLK_HZ // 1000)
