@@ -3,7 +3,7 @@
 campaign over all blocks is `make soak K=mutants`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -52,13 +52,18 @@ def entries(tiny: bool, seed: int) -> Iterator[tuple[str, Mapping[str, Any]]]:
     yield TINY, blocks.BLOCKS.entry(TINY, verdicts_of(TINY, FEW, seed), FEW, seed)
 
 
-def mutants_killed_pct(tiny: bool = False, seed: int = 1) -> float:
+def found_pct(measured: Iterable[tuple[str, Mapping[str, Any]]]) -> float:
+    """Percent of the mutants of these entries that tests have found; each entry is printed."""
     found = of = 0
-    for name, entry in entries(tiny, seed):
+    for name, entry in measured:
         console.print(words_of(name, entry), markup=False, highlight=False)
         found += entry["found"]
         of += different(entry)
     return 100 * found / of
+
+
+def mutants_killed_pct(tiny: bool = False, seed: int = 1) -> float:
+    return found_pct(entries(tiny, seed))
 
 
 def mutants_blocks_under_95(tiny: bool = False, seed: int = 1) -> float:

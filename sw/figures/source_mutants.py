@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
-from figures.common import Absent, Figure, Quick, console
-from mutation.command import different, words_of
+from figures.common import Absent, Figure, Quick
+from figures.mutants import found_pct
 from mutation.firmware import C
 from mutation.host import PYTHON
 from mutation.sources import MUTANTS, Language, NotInstalled
@@ -28,15 +28,10 @@ def entries(
 
 
 def killed_pct(language: Language, count: int, small: str | None = None, seed: int = 1) -> float:
-    found = tried = 0
     try:
-        for name, entry in entries(language, count, small, seed):
-            console.print(words_of(name, entry), markup=False, highlight=False)
-            found += entry["found"]
-            tried += different(entry)
+        return found_pct(entries(language, count, small, seed))
     except NotInstalled as error:
         raise Absent(str(error)) from error
-    return 100 * found / tried
 
 
 def figure(language: Language, count: int, small: str, words: str, bound: str) -> Figure:

@@ -70,7 +70,12 @@ class Node(Devices, Bench):
         self.counts = [0, 0, 0]
         self.connect(CLK_HZ)
         self.load([*PROGRAM, *[0] * (MAILBOX + 4 - len(PROGRAM))])
-        self.set(rst=1, address=5, **IDLE)
+        self.set(address=5, **IDLE)
+        self.reset()
+
+    def reset(self):
+        """A reset, and the cycles in which it has ended everywhere."""
+        self.set(rst=1)
         self.run(16)
         self.set(rst=0)
         self.run(40)

@@ -76,10 +76,7 @@ def test_the_soft_core_waits_for_a_time_or_until_a_word_is_received(node):
     assert cycles_of_a_read(node) < 2 * usual, "there is a word still"
     received(node)
     node.write("node.wait_time", 3900)
-    node.set(rst=1)
-    node.run(16)
-    node.set(rst=0)
-    node.run(40)
+    node.reset()
     assert abs(cycles_of_a_read(node) - first) < usual, "a reset ends the wait"
 
 

@@ -204,9 +204,7 @@ def test_a_reset_ends_a_stream(node):
     node.ticks(2)
     stream(node, 0)
     assert node.read("axis.stream_state", "mode") == PREPARED
-    node.set(rst=1)
-    node.run(16)
-    node.set(rst=0)
+    node.reset()
     node.run(4000)
     assert node.read("axis.stream_state", "mode") == OFF
     assert node.read("node.tick_count") == 0
@@ -891,10 +889,7 @@ def test_the_fine_stage_leaves_its_command_slowly_but_at_once_in_a_reset(node, a
     node.ticks(4)
     returning = node.read("actuator.fine_command", axis=axis)
     assert held - 5 * 16 - 50 < returning < held - 3 * 16 + 50
-    node.set(rst=1)
-    node.run(16)
-    node.set(rst=0)
-    node.run(40)
+    node.reset()
     assert node.read("actuator.fine_command", axis=axis) == 0
 
 
@@ -922,9 +917,7 @@ def test_the_first_position_after_a_reset_crosses_no_zero(node):
     for axis in (0, 1):
         node.count(axis, -6)
     node.run(200)
-    node.set(rst=1)
-    node.run(16)
-    node.set(rst=0)
+    node.reset()
     node.write("node.sample_period", 40)
     node.run(400)
     for axis in (0, 1):
