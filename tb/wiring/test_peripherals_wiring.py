@@ -117,6 +117,42 @@ def test_a_command_of_the_machine_reaches_the_keyboard(peripherals):
     assert not any(peripherals.read("ps2_errors").values())
 
 
+def test_the_keyboard_is_held_for_100_us_before_an_injection(peripherals):
+    peripherals.active = {"edm"}
+    peripherals.write("ps2_idle", value=20)
+    inject(peripherals)
+    for pin in ("keyboard_clock_low", "edm_clock_low"):
+        for waited in range(25 * MS):
+            if peripherals.get(pin):
+                break
+            peripherals.clk()
+    assert waited >= MS // 10
+
+
+def test_a_sequence_is_injected_after_a_command_without_a_keyboard(peripherals):
+    peripherals.active = {"edm"}
+    peripherals.write("ps2_idle", value=20)
+    peripherals.machine.orders = [0xED]
+    peripherals.until(lambda: peripherals.read("ps2_errors")["unsent"])
+    inject(peripherals)
+    peripherals.until(lambda: peripherals.machine.received == CUT)
+
+
+def test_an_answer_that_begins_within_a_second_answers_its_command(peripherals):
+    """The second ends in the middle of the byte."""
+    peripherals.active = {"keyboard", "edm"}
+    commands = []
+    peripherals.keyboard.answer = commands.append
+    peripherals.machine.orders = [0xED]
+    peripherals.until(lambda: commands)
+    peripherals.active = set()
+    peripherals.clk(999 * MS + MS // 2)
+    peripherals.active = {"keyboard", "edm"}
+    peripherals.keyboard.outbox = [0xFA]
+    peripherals.until(lambda: peripherals.machine.received)
+    assert peripherals.read("ps2_typed") == 0
+
+
 def test_a_damaged_command_of_the_machine_reaches_the_keyboard_damaged(peripherals):
     peripherals.active = {"keyboard", "edm"}
     machine = peripherals.machine
