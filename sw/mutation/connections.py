@@ -136,7 +136,7 @@ def instances(node: Node, path: tuple[str, ...] = ()) -> Iterator[tuple[str, str
 
 
 def of_diagram(file: Path) -> list[Connection]:
-    """All port connections of a file, in their order."""
+    """All port connections of a file that are not left open, in their order."""
     text, found = file.read_bytes(), []
     for path, module, actual, whole in instances(tree(file)):
         of_module = ports(module)
@@ -147,6 +147,8 @@ def of_diagram(file: Path) -> list[Connection]:
                 continue  # of a foreign module, or a rule that stops the build
             inside = list(below(port, "kParenGroup"))
             expression = text[slice(*span(inside[0]))].decode()[1:-1].strip() if inside else name
+            if not expression:
+                continue  # left open
             output, width = of_module[name]
             line = text[:start].count(b"\n") + 1
             found.append(

@@ -45,9 +45,9 @@ def without_parameters(text):
 
 
 @pytest.mark.parametrize("file", diagrams(), ids=lambda file: file.stem)
-def test_every_named_connection_of_a_diagram_is_found(file):
+def test_every_named_connection_of_a_diagram_is_found_unless_it_is_left_open(file):
     text = without_parameters(re.sub(r"//.*", "", file.read_text()))
-    written = re.findall(r"^\s*\.\w+", text, re.MULTILINE)
+    written = re.findall(r"^\s*\.\w+\b(?!\s*\(\))", text, re.MULTILINE)
     assert len(of_diagram(file)) == len(written)
 
 
