@@ -97,6 +97,20 @@ def test_what_is_refused_is_counted_by_its_cause(node):
     assert not any(node.read("axis.open_command", axis=axis) for axis in (0, 1))
 
 
+def test_a_request_with_a_byte_without_its_stop_bit_is_damaged(node):
+    """The byte is one too many, so that the request is whole without it."""
+    host = set_up(node)
+    whole = sealed(host.request(0, [1, 2]))
+    for n, byte in enumerate(whole):
+        if n == len(whole) // 2:
+            node.character("link_rx", 0x55, stop=0)
+            node.run(2 * BIT)
+        node.character("link_rx", byte)
+    node.run(600 * BIT)
+    assert node.read("link.refused", "damaged") == 1
+    assert not any(node.read("axis.open_command", axis=axis) for axis in (0, 1))
+
+
 def test_a_silent_host_stops_all_axes(node):
     both_on(node)
     host = set_up(node, watchdog_time=30)

@@ -430,6 +430,24 @@ def test_the_servo_answers_an_error_with_the_gains_of_its_axis(node, axis):
 
 
 @pytest.mark.parametrize("axis", [0, 1])
+def test_the_servo_takes_a_new_gain_without_a_bump(node, axis):
+    node.start()
+    node.write("axis.kp", 1000, axis=axis)
+    node.write("axis.ki", 1, axis=axis)
+    node.write("axis.integral_limit", 0x7FFF, axis=axis)
+    node.write("axis.strobes", set_target_to_position=1, axis=axis)
+    node.enable(axis, closed_loop=1)
+    node.ticks(2)
+    node.count(axis, -4)
+    node.ticks(3)
+    held = node.read("axis.command", axis=axis)
+    assert held == pytest.approx(1000 * 4 * COUNT >> 16, abs=5)
+    node.write("axis.kp", 3000, axis=axis)
+    node.ticks(4)
+    assert node.read("axis.command", axis=axis) == pytest.approx(held, abs=5)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
 def test_the_filters_of_an_axis_act_on_its_command(node, axis):
     node.start()
     node.write("axis.kp", 1000, axis=axis)
@@ -613,6 +631,24 @@ def test_a_stepper_makes_the_steps_of_its_target(node, axis):
         falls = [c for c in changes if c.pin == "step" and not c.value >> axis & 1]
         assert {b.cycle - a.cycle for a, b in zip(rises, falls)} == {10}
     assert not node.bits("axis.faults", axis)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_new_origin_makes_no_steps(node, axis):
+    node.start()
+    node.write("actuator.drive", 1, axis=axis)
+    node.write("actuator.step_ratio", 40 << 32, axis=axis)
+    node.enable(axis)
+    node.ticks(3)
+    node.watch("step", "direction")
+    node.write("axis.shift_origin", 3, axis=axis)
+    node.ticks(4)
+    assert node.read("axis.target", axis=axis) == 3 << 16
+    assert not node.changes()
+    node.watch("step", "direction")
+    play(node, axis, 0x4000, 4)
+    node.ticks(10)
+    assert len(steps_of(node, axis)) == 40
 
 
 def test_the_times_and_levels_of_steps_are_the_settings(node):
