@@ -111,6 +111,15 @@ def test_a_request_with_a_byte_without_its_stop_bit_is_damaged(node):
     assert not any(node.read("axis.open_command", axis=axis) for axis in (0, 1))
 
 
+def test_the_line_counts_as_idle_during_a_reset(node):
+    """A level that is low then and afterwards is a start bit, and here its stop bit is missing."""
+    node.set(link_rx=0)
+    node.reset()
+    node.run(20_000)
+    node.set(link_rx=1)
+    assert node.read("link.framing_errors") == 1
+
+
 def test_a_silent_host_stops_all_axes(node):
     both_on(node)
     host = set_up(node, watchdog_time=30)

@@ -255,6 +255,23 @@ def test_steps_take_the_backlash_up_at_a_reversal(node, axis):
 
 
 @pytest.mark.parametrize("axis", [0, 1])
+def test_the_table_is_behind_a_sensor_at_the_motor_until_a_reset(node, axis):
+    stepper_with_backlash(node, axis, hysteresis=1)
+    before = node.read("axis.position", axis=axis)
+    play(node, axis, 0x4000, 4)
+    node.ticks(16)
+    assert node.read("axis.position", axis=axis) == before
+    node.write("feedback.backlash_rate", hysteresis=1, motor_side=1, axis=axis)
+    node.run(100)
+    assert node.read("axis.position", axis=axis) == before - 0x8000
+    node.reset()
+    stepper_with_backlash(node, axis, hysteresis=1)
+    node.write("feedback.backlash_rate", hysteresis=1, motor_side=1, axis=axis)
+    node.ticks(3)
+    assert node.read("axis.position", axis=axis) >= 0
+
+
+@pytest.mark.parametrize("axis", [0, 1])
 def test_backlash_is_taken_up_at_its_rate(node, axis):
     stepper_with_backlash(node, axis, hysteresis=1, rate=0x1000)  # in eight ticks
     play(node, axis, 0x4000, 4)
