@@ -190,16 +190,16 @@ def test_the_correction_of_an_axis_is_loaded_as_a_whole(node, axis):
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_harmonic_table_is_used_after_the_swap_while_it_is_enabled(node, axis):
     scale = Scale(node)
-    scale.turn(axis, 0.125)
+    scale.turn(axis, 1 / 128)  # between the points 0 and 1: other writes have the number 0
     before = node.read("axis.phase", "phase", axis)
     for point in range(65):
-        node.write("feedback.harmonic_point", value=16 * 1000, point=point, axis=axis)
+        node.write("feedback.harmonic_point", value=-16 * 1000, point=point, axis=axis)
     node.write("feedback.harmonic_enable", 1, axis=axis)
     node.run(4 * SAMPLE)
     assert node.read("axis.phase", "phase", axis) == before
     node.write("feedback.strobes", swap_harmonics=1, axis=axis)
     node.run(6 * SAMPLE)
-    assert abs(node.read("axis.phase", "phase", axis) - (before - 1000)) <= 1
+    assert abs(node.read("axis.phase", "phase", axis) - (before + 1000)) <= 1
     assert node.read("axis.position", axis=axis) % PERIOD == node.read("axis.phase", "phase", axis)
     node.write("feedback.harmonic_enable", 0, axis=axis)
     node.run(6 * SAMPLE)
