@@ -190,7 +190,7 @@ def test_the_correction_of_an_axis_is_loaded_as_a_whole(node, axis):
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_harmonic_table_is_used_after_the_swap_while_it_is_enabled(node, axis):
     scale = Scale(node)
-    scale.turn(axis, 1 / 128)  # between the points 0 and 1: other writes have the number 0
+    scale.turn(axis, 1 / 512)  # between the points 0 and 1: other writes have the number 0
     before = node.read("axis.phase", "phase", axis)
     for point in range(65):
         node.write("feedback.harmonic_point", value=-16 * 1000, point=point, axis=axis)
