@@ -44,6 +44,17 @@ def test_a_frame_for_this_node_is_received_and_checked(node):
     assert node.read("bus.frames_good") == 0
 
 
+def test_a_frame_with_a_character_without_its_stop_bit_is_bad(node):
+    """The character is one too many, so that the frame is whole without it."""
+    bus(node)
+    first = command_byte(5, TO_NODE)
+    words = [first | NINTH, *frame(first, bytes([0x12, 0xA5]))]
+    node.send_words(words[:3])
+    node.character("rs485_rx", 0x55, 0, stop=0)
+    node.send_words(words[3:])
+    assert node.read("bus.frames_good") == 0 and node.read("bus.frames_bad") == 1
+
+
 def test_a_frame_for_another_node_does_not_pass(node):
     bus(node)
     node.send_frame(address=4)
@@ -131,6 +142,7 @@ def test_what_goes_wrong_on_the_bus_is_counted(node):
     def counts():
         return {name: node.read(f"bus.{name}") for name in counters}
 
+    node.run(CLK_HZ // 1000 * 21 // 10)
     assert counts() == dict.fromkeys(counters, 0)
     node.character("rs485_rx", 0x55, 0, stop=0)
     node.run(20 * BIT)
