@@ -32,6 +32,7 @@ def set_up(node, **settings):
     for n in range(len(READS)):
         node.write("link.entry_number", n)
         node.write("link.entry", write=WRITES[n % 2], read=READS[n])
+    node.write("link.entry_number", 0)  # an entry is stored by its own write alone
     node.write("link.session", SESSION)
     node.write("link.lists", writes=len(WRITES), reads=len(READS))
     for name, value in settings.items():
@@ -40,15 +41,15 @@ def set_up(node, **settings):
     return Link(SESSION, len(WRITES), len(READS))
 
 
-def exchange(node, packet, sent=sealed):
+def exchange(node, packet, bit=BIT):
     """Sends a packet; returns the bytes of the reply, and the changes of the driver enable."""
     node.watch("link_tx", "link_driver_enable")
-    for byte in sent(packet):
-        node.character("link_rx", byte)
-    node.run(600 * BIT)
+    for byte in sealed(packet):
+        node.character("link_rx", byte, bit=bit)
+    node.run(600 * bit)
     changes = node.changes()
     enable = [c for c in changes if c.pin == "link_driver_enable"]
-    heard = bytes(node.characters("link_tx", changes))
+    heard = bytes(node.characters("link_tx", changes, bit=bit))
     if enable:
         tx = [c.cycle for c in changes if c.pin == "link_tx"]
         assert enable[0].cycle < tx[0] and enable[-1].cycle > tx[-1]
@@ -68,6 +69,41 @@ def test_a_request_on_the_line_writes_and_reads_the_registers(node):
         assert [node.read("axis.open_command", axis=axis) for axis in (0, 1)] == values
     state = dict(built=1, on=1, busy=0, expired=0, session=SESSION)
     assert node.fields("link.state") == state
+
+
+def test_a_bit_of_the_line_may_have_four_cycles(node):
+    bit = 4
+    host = set_up(node, bit_time=16 * bit)
+    content, enable = exchange(node, host.request(0, [7, 0x5555]), bit)
+    assert enable == [1, 0]
+    assert host.reply(content).values[2:] == (0x5555, 7)
+
+
+def test_the_state_shows_a_request_that_is_being_answered(node):
+    set_up(node)
+    reads = 120
+    for n in range(reads):
+        node.write("link.entry_number", n)
+        node.write("link.entry", write=WRITES[n % 2], read=READS[0])
+    node.write("link.lists", writes=0, reads=reads)
+    assert node.read("link.state", "busy") == 0
+    for byte in sealed(Link(SESSION, 0, reads).request(0, [])):
+        node.character("link_rx", byte)
+    assert node.read("link.state", "busy") == 1
+    node.run(600 * BIT)
+    assert node.read("link.state", "busy") == 0
+
+
+def test_a_reset_in_the_middle_of_a_character_on_the_line_drops_it(node):
+    """What begins with the reset has a stop bit, what began before it would have none."""
+    bit = node.read("link.bit_time") // 16
+    node.set(link_rx=0)
+    node.run(5 * bit)
+    node.reset()
+    node.run(6 * bit)
+    node.set(link_rx=1)
+    node.run(20 * bit)
+    assert node.read("link.framing_errors") == 0
 
 
 def test_what_is_refused_is_counted_by_its_cause(node):
