@@ -45,7 +45,8 @@ ABSENT = {  # instances that a design does not have, and ports for a carrier tha
     "node": (
         *("g_serial_core.", "g_link.g_udp.", "g_link.g_spi.", "u_link.udp_"),
         *("u_link.link_cs_n", "u_link.link_sclk", "u_link.link_mosi", "u_link.link_miso"),
-    )
+    ),
+    "relay": ("g_segments.",),
 }
 ZERO = re.compile(r"(\d*'[bdh]?0+|0)")
 ONE = re.compile(r"(1'b1|1'd1)")

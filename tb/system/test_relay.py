@@ -49,7 +49,8 @@ class Relay:
         self.count = 0  # counts of the ring from its index, which is one count wide
         self.counted, self.levels, self.edges = 0, None, []
         self.clks, self.index_at = 0, []
-        self.with_index = True
+        self.with_index, self.index_low = True, 0
+        self.index_counts = (0,)  # of the ring, at which its index is
         self.sequence = 0
 
     async def power_up(self, count=0):
@@ -67,7 +68,8 @@ class Relay:
     def show(self):
         b = self.count >> 1 & 1
         self.dut.encoder_a.value, self.dut.encoder_b.value = b ^ self.count & 1, b
-        self.dut.encoder_z.value = int(self.count % COUNTS == 0 and self.with_index)
+        index = self.count % COUNTS in self.index_counts and self.with_index
+        self.dut.encoder_z.value = int(index) ^ self.index_low
 
     async def clk(self, count=1):
         dut = self.dut
@@ -208,6 +210,20 @@ async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
 
 
 @cocotb.test()
+async def it_follows_a_steep_correction_while_the_ring_turns(dut):
+    terms = [term_of(300.0, 0.0), (0, 0)]
+    relay = await Relay(dut).power_up(count=-8)
+    await relay.booted()
+    await relay.send_set(image(terms, COUNTS, **GATED))
+    await relay.go(20, clk_each=4)
+    await relay.clk(400)
+    for _ in range(500):
+        await relay.go(1, clk_each=4)
+        behind = relay.counted - corrected(relay.count, terms)
+        assert abs(behind) < 6, relay.count  # some cycles late, by up to 3/2 counts in 4 cycles
+
+
+@cocotb.test()
 async def latency_is_10(dut):
     steady_only("a latency to the cycle")
     assert await (await Relay(dut).power_up()).latencies() == [10] * 4
@@ -228,6 +244,83 @@ async def z_comes_once_a_turn_where_the_corrected_position_is_zero(dut):
 
 
 @cocotb.test()
+async def the_outputs_have_the_levels_of_the_ring_before_its_first_edge(dut):
+    for count in (1, 3):
+        relay = await Relay(dut).power_up(count)
+        inputs = int(dut.encoder_a.value), int(dut.encoder_b.value)
+        assert relay.levels == inputs
+        relay.counted = count
+        await relay.go(3, clk_each=30)
+        assert relay.counted == count + 3
+
+
+@cocotb.test()
+async def a_wide_index_is_taken_where_its_gate_says_whatever_its_level(dut):
+    relay = Relay(dut)
+    relay.index_counts = COUNTS - 1, 0, 1, 2
+    await relay.power_up(count=-8)
+    await relay.booted()
+    for low, mask, gate, at in ((0, 3, 0, 0), (0, 3, 3, 2), (1, 2, 3, -1), (1, 1, 1, 1)):
+        relay.index_low = low
+        relay.show()
+        await relay.send_set(image([(0, 0)] * K, COUNTS, index_low=low, gate_mask=mask, gate=gate))
+        relay.index_at.clear()
+        await relay.go(16, clk_each=20)
+        assert relay.index_at[-1] == at, (low, mask, gate)
+        await relay.go(-16)
+
+
+@cocotb.test()
+async def an_index_on_the_way_down_is_taken_too(dut):
+    relay = await Relay(dut).power_up(count=20)
+    await relay.booted()
+    await relay.send_set(image(some_terms(), COUNTS, **GATED))
+    await relay.go(-40, clk_each=4)
+    assert (await relay.status()).levels == KNOWN | LOADED | CORRECTING
+
+
+@cocotb.test()
+async def a_turn_with_another_number_of_counts_is_flagged(dut):
+    relay = await Relay(dut).power_up(count=-4)
+    await relay.booted()
+    await relay.send_set(image(some_terms(), COUNTS, **GATED))
+    await relay.go(20)
+    await relay.go(COUNTS)
+    assert (await relay.status()).flags == 0
+    relay.count += 4  # without their edges
+    await relay.go(COUNTS)
+    assert (await relay.status()).flags == WRONG_TURN
+
+
+@cocotb.test()
+async def the_filter_asks_for_samples_in_a_row(dut):
+    steady_only("a pattern to the cycle")
+    relay = await Relay(dut).power_up(count=-4)
+    await relay.booted()
+    await relay.send_set(image(some_terms(0.001), COUNTS, filter_required=4, **GATED))
+    await relay.go(20, clk_each=8)
+    await relay.clk(30)
+    relay.edges.clear()
+    level = int(dut.encoder_a.value)
+    for other in (1, 1, 1, 0, 1):
+        dut.encoder_a.value = level ^ other
+        await relay.clk()
+    relay.show()
+    await relay.clk(30)
+    assert not relay.edges
+
+
+@cocotb.test()
+async def the_line_counts_as_idle_during_a_reset(dut):
+    relay = await Relay(dut).power_up()
+    dut.rs485_rx.value, dut.rst.value = 0, 1  # a start bit, once the reset is over
+    await relay.clk(8)
+    dut.rst.value = 0
+    await relay.send(Exchange(bytes([9, STATUS]), tries=1).words_to_send())
+    assert await relay.receive()
+
+
+@cocotb.test()
 async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(dut):
     relay = await Relay(dut).power_up(count=-4)
     await relay.booted()
@@ -244,6 +337,7 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
         relay.show()
         await relay.clk(30)
     assert (await relay.status()).flags & ILLEGAL
+    assert not (await relay.clear()).flags & ILLEGAL
 
 
 @cocotb.test()
