@@ -248,7 +248,7 @@ async def the_outputs_have_the_levels_of_the_ring_before_its_first_edge(dut):
     for count in (1, 3):
         relay = await Relay(dut).power_up(count)
         inputs = int(dut.encoder_a.value), int(dut.encoder_b.value)
-        assert relay.levels == inputs
+        assert relay.levels == inputs and len(relay.edges) == 1, "at once"
         relay.counted = count
         await relay.go(3, clk_each=30)
         assert relay.counted == count + 3
@@ -293,6 +293,23 @@ async def a_turn_with_another_number_of_counts_is_flagged(dut):
 
 
 @cocotb.test()
+async def the_output_keeps_its_hysteresis_and_its_time_between_two_edges(dut):
+    apart = 20  # cycles
+    relay = await Relay(dut).power_up(count=-8)
+    await relay.booted()
+    settings = dict(minimum_edge_separation=apart, hysteresis=0xFFFF, **GATED)
+    await relay.send_set(image([(0, 0)] * K, COUNTS, **settings))
+    await relay.go(20)
+    await relay.clk(20 * apart)
+    assert relay.counted == relay.count - 1
+    relay.edges.clear()
+    await relay.go(-20)
+    await relay.clk(20 * apart)
+    assert relay.counted == relay.count + 1
+    assert {b - a for a, b in zip(relay.edges, relay.edges[1:])} == {apart}
+
+
+@cocotb.test()
 async def the_filter_asks_for_samples_in_a_row(dut):
     steady_only("a pattern to the cycle")
     relay = await Relay(dut).power_up(count=-4)
@@ -327,7 +344,9 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
     await relay.send_set(image(some_terms(), COUNTS, **GATED))
     await relay.go(20)
     relay.with_index = False
+    relay.index_at.clear()
     await relay.go(COUNTS + 10)
+    assert set(relay.index_at) == {COUNTS}, "where it is missing"
     assert int(dut.fault.value) and (await relay.status()).flags == MISSING
     assert (await relay.clear(~MISSING & 0xFF)).flags == MISSING and (
         await relay.clear(MISSING)
