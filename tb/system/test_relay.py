@@ -290,6 +290,7 @@ async def a_turn_with_another_number_of_counts_is_flagged(dut):
     relay.count += 4  # without their edges
     await relay.go(COUNTS)
     assert (await relay.status()).flags == WRONG_TURN
+    assert (await relay.clear()).flags == 0
 
 
 @cocotb.test()
