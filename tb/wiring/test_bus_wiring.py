@@ -268,3 +268,12 @@ def test_a_reset_in_the_middle_of_a_character_drops_it(node):
     node.character("rs485_rx", command, 1, bit=bit)
     node.run(20 * bit)
     assert received(node) == [(command, 1, 0)]
+
+
+def test_the_line_of_the_bus_counts_as_idle_during_a_reset(node):
+    """A level that is low then and afterwards is a start bit, and here its stop bit is missing."""
+    node.set(rs485_rx=0)
+    node.reset()
+    node.run(2000)
+    node.set(rs485_rx=1)
+    assert node.read("bus.framing_errors") == 1
