@@ -308,6 +308,7 @@ async def the_output_keeps_its_hysteresis_and_its_time_between_two_edges(dut):
     await relay.clk(20 * apart)
     assert relay.counted == relay.count + 1
     assert {b - a for a, b in zip(relay.edges, relay.edges[1:])} == {apart}
+    assert (await relay.status()).flags == BEHIND
 
 
 @cocotb.test()
