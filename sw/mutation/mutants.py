@@ -132,7 +132,8 @@ class Design:
             Mutant(c, what, (n, kind, 0))
             for c, n in self.number.items()
             for kind, what in enumerate(KINDS)
-            if c in self.chosen - self.unheard and c not in self.same
+            if c in self.chosen - self.unheard
+            and not (c in self.same and self.same[c] in self.chosen)
         ]
         for n, (one, other) in enumerate(self.pairs, 1):
             if one.expression != other.expression and not {one, other} <= self.unheard:

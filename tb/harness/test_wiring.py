@@ -119,7 +119,9 @@ def test_a_survivor_with_a_reason_is_explained_and_one_that_is_found_is_stale(mo
 
 
 def test_every_reason_is_about_a_fault_that_exists():
-    names = [m.name for m in Design.of(diagrams()).mutants()]
+    design = Design.of(diagrams())
+    alone = [f"{c.name} {kind}" for c in design.same for kind in KINDS]  # without their listeners
+    names = [m.name for m in design.mutants()] + alone
     for pattern, reason in wiring.reasons().items():
         assert fnmatch.filter(names, pattern), pattern
         assert len(reason) > 20

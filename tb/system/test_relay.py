@@ -163,6 +163,13 @@ class Relay:
             answer = await self.request(SET if n else BEGIN_SET, bytes(relay_set[n : n + PIECE]))
         return Status.of(answer)
 
+    async def with_set(self, relay_set, count=0):
+        """Power-up at a count of the ring, and a set."""
+        await self.power_up(count)
+        await self.booted()
+        await self.send_set(relay_set)
+        return self
+
     async def save(self, relay_set, address):
         """Save one copy into an erased sector."""
         for command, at, more in (
@@ -181,9 +188,7 @@ def corrected(count, terms):
 @cocotb.test()
 async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
     terms = some_terms()
-    relay = await Relay(dut).power_up(count=COUNTS - 60)
-    await relay.booted()
-    await relay.send_set(image(terms, COUNTS, **GATED))
+    relay = await Relay(dut).with_set(image(terms, COUNTS, **GATED), count=COUNTS - 60)
     assert not int(dut.correcting.value)
     await relay.go(50, clk_each=4)
     await relay.clk(40)
@@ -212,9 +217,7 @@ async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
 @cocotb.test()
 async def it_follows_a_steep_correction_while_the_ring_turns(dut):
     terms = [term_of(300.0, 0.0), (0, 0)]
-    relay = await Relay(dut).power_up(count=-8)
-    await relay.booted()
-    await relay.send_set(image(terms, COUNTS, **GATED))
+    relay = await Relay(dut).with_set(image(terms, COUNTS, **GATED), count=-8)
     await relay.go(20, clk_each=4)
     await relay.clk(400)
     for _ in range(500):
@@ -232,9 +235,7 @@ async def latency_is_10(dut):
 @cocotb.test()
 async def z_comes_once_a_turn_where_the_corrected_position_is_zero(dut):
     terms = [term_of(4.0, math.pi / 2), (0, 0)]
-    relay = await Relay(dut).power_up(count=-20)
-    await relay.booted()
-    await relay.send_set(image(terms, COUNTS, hysteresis=0, **GATED))
+    relay = await Relay(dut).with_set(image(terms, COUNTS, hysteresis=0, **GATED), count=-20)
     await relay.go(100, clk_each=4)
     relay.index_at.clear()
     for steps in (-200, 200):
@@ -272,18 +273,14 @@ async def a_wide_index_is_taken_where_its_gate_says_whatever_its_level(dut):
 
 @cocotb.test()
 async def an_index_on_the_way_down_is_taken_too(dut):
-    relay = await Relay(dut).power_up(count=20)
-    await relay.booted()
-    await relay.send_set(image(some_terms(), COUNTS, **GATED))
+    relay = await Relay(dut).with_set(image(some_terms(), COUNTS, **GATED), count=20)
     await relay.go(-40, clk_each=4)
     assert (await relay.status()).levels == KNOWN | LOADED | CORRECTING
 
 
 @cocotb.test()
 async def a_turn_with_another_number_of_counts_is_flagged(dut):
-    relay = await Relay(dut).power_up(count=-4)
-    await relay.booted()
-    await relay.send_set(image(some_terms(), COUNTS, **GATED))
+    relay = await Relay(dut).with_set(image(some_terms(), COUNTS, **GATED), count=-4)
     await relay.go(20)
     await relay.go(COUNTS)
     assert (await relay.status()).flags == 0
@@ -314,9 +311,9 @@ async def the_output_keeps_its_hysteresis_and_its_time_between_two_edges(dut):
 @cocotb.test()
 async def the_filter_asks_for_samples_in_a_row(dut):
     steady_only("a pattern to the cycle")
-    relay = await Relay(dut).power_up(count=-4)
-    await relay.booted()
-    await relay.send_set(image(some_terms(0.001), COUNTS, filter_required=4, **GATED))
+    relay = await Relay(dut).with_set(
+        image(some_terms(0.001), COUNTS, filter_required=4, **GATED), count=-4
+    )
     await relay.go(20, clk_each=8)
     await relay.clk(30)
     relay.edges.clear()
@@ -341,9 +338,7 @@ async def the_line_counts_as_idle_during_a_reset(dut):
 
 @cocotb.test()
 async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(dut):
-    relay = await Relay(dut).power_up(count=-4)
-    await relay.booted()
-    await relay.send_set(image(some_terms(), COUNTS, **GATED))
+    relay = await Relay(dut).with_set(image(some_terms(), COUNTS, **GATED), count=-4)
     await relay.go(20)
     relay.with_index = False
     relay.index_at.clear()
@@ -363,9 +358,9 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
 
 @cocotb.test()
 async def a_glitch_is_rejected_and_flagged(dut):
-    relay = await Relay(dut).power_up(count=-4)
-    await relay.booted()
-    await relay.send_set(image(some_terms(0.001), COUNTS, filter_required=4, **GATED))
+    relay = await Relay(dut).with_set(
+        image(some_terms(0.001), COUNTS, filter_required=4, **GATED), count=-4
+    )
     await relay.go(20, clk_each=8)
     dut.encoder_a.value = 1 - int(dut.encoder_a.value)
     await relay.clk(2)
@@ -485,9 +480,7 @@ async def flash_bytes_come_back(dut):
 
 @cocotb.test()
 async def reset_in_mid_flow(dut):
-    relay = await Relay(dut).power_up(count=-4)
-    await relay.booted()
-    await relay.send_set(image(some_terms(), COUNTS, **GATED))
+    relay = await Relay(dut).with_set(image(some_terms(), COUNTS, **GATED), count=-4)
     await relay.go(30)
     await relay.send(Exchange(bytes([1, BEGIN_SET, 1, 2])).words_to_send()[:4])
     dut.rs485_rx.value = 0  # a start bit

@@ -80,6 +80,13 @@ class Node(Devices, Bench):
         self.set(rst=0)
         self.run(40)
 
+    def reset_with_low(self, pin):
+        """A reset during which a serial input is low; it stays low for more than a character."""
+        self.set(**{pin: 0})
+        self.reset()
+        self.run(2000)
+        self.set(**{pin: 1})
+
     # ---- registers
 
     @staticmethod

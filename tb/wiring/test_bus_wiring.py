@@ -272,8 +272,5 @@ def test_a_reset_in_the_middle_of_a_character_drops_it(node):
 
 def test_the_line_of_the_bus_counts_as_idle_during_a_reset(node):
     """A level that is low then and afterwards is a start bit, and here its stop bit is missing."""
-    node.set(rs485_rx=0)
-    node.reset()
-    node.run(2000)
-    node.set(rs485_rx=1)
+    node.reset_with_low("rs485_rx")
     assert node.read("bus.framing_errors") == 1

@@ -150,10 +150,7 @@ def test_a_request_with_a_byte_without_its_stop_bit_is_damaged(node):
 
 def test_the_line_counts_as_idle_during_a_reset(node):
     """A level that is low then and afterwards is a start bit, and here its stop bit is missing."""
-    node.set(link_rx=0)
-    node.reset()
-    node.run(20_000)
-    node.set(link_rx=1)
+    node.reset_with_low("link_rx")
     assert node.read("link.framing_errors") == 1
 
 

@@ -228,13 +228,18 @@ def test_a_stream_ends_in_a_stop_and_needs_a_drive(node):
     assert node.read("axis.stream_state", "ended") == FAULT
 
 
+def stepper(node, axis):
+    """A stepper with 40 steps in a period."""
+    node.start()
+    node.write("actuator.drive", 1, axis=axis)
+    node.write("actuator.step_ratio", 40 << 32, axis=axis)
+
+
 def stepper_with_backlash(node, axis, hysteresis, rate=0):
     """A stepper with 40 steps in a period and half a period of backlash, on; hysteresis in 2^-8
     period, rate in 2^-16 period/tick.
     """
-    node.start()
-    node.write("actuator.drive", 1, axis=axis)
-    node.write("actuator.step_ratio", 40 << 32, axis=axis)
+    stepper(node, axis)
     node.write("feedback.backlash", 0x8000, axis=axis)
     node.write("feedback.backlash_rate", value=rate, hysteresis=hysteresis, axis=axis)
     node.enable(axis)
@@ -627,9 +632,7 @@ def steps_of(node, axis, name="step"):
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_stepper_makes_the_steps_of_its_target(node, axis):
-    node.start()
-    node.write("actuator.drive", 1, axis=axis)
-    node.write("actuator.step_ratio", 40 << 32, axis=axis)
+    stepper(node, axis)
     node.enable(axis)
     node.ticks(3)
     assert node.read("actuator.steps", axis=axis) == 0
@@ -652,9 +655,7 @@ def test_a_stepper_makes_the_steps_of_its_target(node, axis):
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_new_origin_makes_no_steps(node, axis):
-    node.start()
-    node.write("actuator.drive", 1, axis=axis)
-    node.write("actuator.step_ratio", 40 << 32, axis=axis)
+    stepper(node, axis)
     node.enable(axis)
     node.ticks(3)
     node.watch("step", "direction")
