@@ -200,8 +200,9 @@ def quiet(sim):
 def of_mutants(request, source, parameters, name):
     """(source, environment) of the simulation of a block with its mutants, by a request of
     mutation.blocks, which finds the verdicts by the name of the test. A test of another module is
-    skipped, and so is one whose build has itself left all faults that are asked for. A mutant that
-    another test of the same build has found is not run again.
+    skipped, and so is one whose build has itself left all faults that are asked for, or has none of
+    the mutants that are asked for by their labels. A mutant that another test of the same build has
+    found is not run again.
     """
     file = Path(request)
     asked = json.loads(file.read_text())
@@ -213,7 +214,14 @@ def of_mutants(request, source, parameters, name):
     choice = asked["count"], asked["seed"], faults
     folder = block.prepared(source, parameters, rtl_path(), *choice)
     found = block.Run.found(file.parent, folder)
-    numbers = [m.number for m in block.mutants_of(folder) if m.number not in found]
+    numbers = [
+        m.number
+        for m in block.mutants_of(folder)
+        if m.number not in found
+        and (not asked["labels"] or block.label(source.stem, parameters, m) in asked["labels"])
+    ]
+    if asked["labels"] and not numbers:
+        pytest.skip("this build has none of the mutants that are asked for")
     block.Run(str(folder), parameters, numbers).write(file.parent / f"{name}.json")
     return folder / block.NETLIST, {
         "MUTANT_VERDICTS": str(file.parent / f"{name}.verdicts"),

@@ -83,6 +83,17 @@ class CellMutant:
         return self.source, self.kind, self.port, self.mode
 
 
+def build_words(parameters: netlist.Parameters) -> str:
+    """The parameters of a build in one line."""
+    return " ".join(f"{name}={Path(str(value)).name}" for name, value in parameters.items())
+
+
+def label(block: str, parameters: netlist.Parameters, mutant: CellMutant) -> str:
+    """The place and the name of a mutant of a block that is built with these parameters."""
+    build = build_words(parameters)
+    return f"{mutant.place}: {block}{' ' if build else ''}{build}: {mutant.name}"
+
+
 def words_of(line: str) -> dict[str, list[str]]:
     """{option: its values} of a line of Yosys's list."""
     found: dict[str, list[str]] = {}

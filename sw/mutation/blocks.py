@@ -18,18 +18,28 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 from campaigns import record
 from mutation import command, equivalence
-from mutation.block import BUILD, CellMutant, Fault, MutationError, Run, mutants_of
+from mutation.block import (
+    BUILD,
+    CellMutant,
+    Fault,
+    MutationError,
+    Run,
+    build_words,
+    label,
+    mutants_of,
+)
 from twin.build import ROOT, rtl_path
 
 MUTANTS = 1000  # of a block
 LOOK = 30  # of a fault in another build
+BEFORE_WORDS = "; "  # of equivalence, in the line of a survivor
 REASONS = Path(__file__).with_name("blocks.toml")
 LONGEST_S = 24 * 3600
 
@@ -49,17 +59,14 @@ class Reason:
 class Survivor:
     """A mutant that no test of its block sees."""
 
-    block: str
-    build: str  # the parameters, such as W=16 DEPTH=4
+    label: str  # its place and its name
     mutant: CellMutant
-    verdict: str  # of equivalence
-    words: str
+    words: str  # of equivalence
 
     @property
     def text(self) -> str:
         """One line for a person."""
-        build = f" {self.build}" if self.build else ""
-        return f"{self.mutant.place}: {self.block}{build}: {self.mutant.name}; {self.words}"
+        return f"{self.label}{BEFORE_WORDS}{self.words}"
 
 
 def fits(reason: Reason, block: str, build: str, mutant: CellMutant) -> bool:
@@ -156,11 +163,6 @@ def builds_of(block: str) -> int:
     return pytest(["--collect-only", *tests()[block]], {}).count("::")
 
 
-def build_words(parameters: Mapping[str, int | str]) -> str:
-    """The parameters of a build in one line."""
-    return " ".join(f"{name}={Path(str(value)).name}" for name, value in parameters.items())
-
-
 Results = dict[CellMutant, bool]  # whether a test finds it
 Runs = Sequence[tuple[Run, dict[int, str]]]
 
@@ -245,7 +247,7 @@ def judge(block: str, runs: Runs, looks: Runs = ()) -> Verdicts:
         compared = equivalence.compared(path, ports, [mutant.number for mutant in unseen])
         for mutant, reason in unseen.items():
             verdict, how = compared[mutant.number]
-            survivor = Survivor(block, words, mutant, verdict, how)
+            survivor = Survivor(label(block, builds.parameters[folder], mutant), mutant, how)
             if verdict == equivalence.EQUIVALENT:
                 verdicts.equivalent += 1
             elif reason:
@@ -274,20 +276,29 @@ def simulated(folder: Path, block: str, **asked: object) -> Runs:
     return Run.all(folder)
 
 
-def measured(block: str, count: int = MUTANTS, seed: int = 1, only: str = "") -> Verdicts:
+def measured(
+    block: str,
+    count: int = MUTANTS,
+    seed: int = 1,
+    only: str = "",
+    survivors: Collection[str] = (),
+) -> Verdicts:
     """Run so many mutants of a block against its tests, or against those cocotb tests whose names
-    have `only` in them. Faults that a build leaves are then looked for in its other builds.
+    have `only` in them; of these mutants all, or the survivors whose lines are given. Faults that a
+    build leaves are then looked for in its other builds.
     """
     BUILD.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=BUILD, prefix="run-") as temporary:
         folder, each = Path(temporary), max(1, round(count / builds_of(block)))
         asked = {"seed": seed, "tests": only}
-        runs = simulated(folder / "runs", block, count=each, faults=[], **asked)
+        labels = [survivor.partition(BEFORE_WORDS)[0] for survivor in survivors]
+        runs = simulated(folder / "runs", block, count=each, faults=[], labels=labels, **asked)
         if not runs:
             raise MutationError(f"{block}: no test has made a build of it")
         looks: Runs = ()
         if (left := Builds(block, runs).left()) and builds_of(block) > 1:
-            looks = simulated(folder / "looks", block, count=LOOK, faults=left, **asked)
+            asked |= {"faults": left, "labels": []}
+            looks = simulated(folder / "looks", block, count=LOOK, **asked)
         return judge(block, runs, looks)
 
 
@@ -304,10 +315,10 @@ def entry_of(verdicts: Verdicts, count: int, seed: int) -> record.Entry:
     }
 
 
-def named(block: str, count: int, seed: int) -> Verdicts:
+def named(block: str, count: int, seed: int, survivors: Collection[str] = ()) -> Verdicts:
     """As measured; an error begins with the name of the block."""
     try:
-        return measured(block, count, seed)
+        return measured(block, count, seed, survivors=survivors)
     except MutationError as error:
         raise MutationError(f"{block}: {error}") from error
 

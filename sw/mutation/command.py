@@ -55,7 +55,8 @@ class Subjects(Generic[V]):
     names: Callable[[], Collection[str]]
     unknown: str  # what is said of another name
     path_of: Callable[[str], Path]
-    measured: Callable[[str, int, int], V]  # of a name, so many mutants, by a seed
+    # of a name, so many mutants, by a seed; of these the survivors of an entry, if there are any
+    measured: Callable[[str, int, int, Sequence[str]], V]
     entry_of: Callable[[V, int, int], record.Entry]
 
     def source(self, name: str) -> str:
@@ -84,10 +85,30 @@ class Subjects(Generic[V]):
         for name in names:
             entry = self.known(name, count) if seed == 1 else None
             if entry is None:
-                entry = self.entry(name, self.measured(name, count, seed), count, seed)
+                entry = self.entry(name, self.measured(name, count, seed, ()), count, seed)
                 if seed == 1:
                     record.add(name, entry, record.MUTANTS)
             yield name, entry
+
+    def again(self, name: str) -> dict[str, Any]:
+        """The entry of the record after another run of its survivors, with the tests and reasons as
+        they are now.
+        """
+        old = self.known(name, 0)
+        if old is None:
+            raise MutationError(f"{name}: the record has no mutants of the source as it is")
+        survivors = old["survivors"]
+        if not survivors:
+            return old
+        verdicts = self.measured(name, old["asked"], old["seed"], survivors)
+        new = self.entry(name, verdicts, old["asked"], old["seed"])
+        if new["mutants"] != len(survivors):
+            raise MutationError(
+                f"{name}: {new['mutants']} mutants have the names of {len(survivors)} survivors: "
+                "run all mutants"
+            )
+        sums = {key: old[key] + new[key] for key in ("found", "equivalent", "explained")}
+        return {**old, **sums, "survivors": new["survivors"]}
 
 
 def different(entry: Mapping[str, Any]) -> int:
@@ -117,6 +138,11 @@ def run(
     )
     parser.add_argument("--count", type=int, default=mutants, help="mutants of each")
     parser.add_argument("--seed", type=int, default=1, help="which mutants, 1 and up")
+    parser.add_argument(
+        "--again",
+        action="store_true",
+        help="run only the survivors of docs/mutants.toml, with its count and seed",
+    )
     parser.add_argument("--record", action="store_true", help="add the results to docs")
     options = parser.parse_args(arguments)
     names = options.names or sorted(known)
@@ -130,20 +156,23 @@ def run(
         return 0
     wrong = 0
     for name in names:
+        stale: Sequence[str] = ()
         try:
-            verdicts = subjects.measured(name, options.count, options.seed)
+            if options.again:
+                entry = subjects.again(name)
+                print(words_of(name, entry), flush=True)
+            else:
+                verdicts = subjects.measured(name, options.count, options.seed, ())
+                entry = subjects.entry(name, verdicts, options.count, options.seed)
+                stale = verdicts.stale
+                print("\n  ".join([f"{name}: {verdicts.words}", *entry["survivors"]]), flush=True)
         except MutationError as error:
             print(error, file=sys.stderr, flush=True)
             wrong += 1
             continue
-        entry = subjects.entry(name, verdicts, options.count, options.seed)
-        survivors = entry["survivors"]
-        print(f"{name}: {verdicts.words}", flush=True)
-        for survivor in survivors:
-            print(f"  {survivor}", flush=True)
-        for line in verdicts.stale:
+        for line in stale:
             print(f"  stale reason: {line}", flush=True)
-        wrong += len(survivors) + len(verdicts.stale)
+        wrong += len(entry["survivors"]) + len(stale)
         if options.record:
             record.add(name, entry, record.MUTANTS)
     return int(wrong > 0)

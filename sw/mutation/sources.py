@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -190,10 +190,18 @@ class Language:
             if running.wait():
                 raise MutationError(f"{source}: the runs ended with exit code {running.returncode}")
 
-    def measured(self, source: str, count: int = MUTANTS, seed: int = 1) -> Verdicts:
-        """Run the tests of a source on so many mutants of it."""
+    def measured(
+        self, source: str, count: int = MUTANTS, seed: int = 1, survivors: Collection[str] = ()
+    ) -> Verdicts:
+        """Run the tests of a source on so many mutants of it: on all of them, or on the survivors
+        whose words are given.
+        """
         known = [reason for reason in self.reasons() if reason.source == source]
-        mutants = self.mutants_of(source, count, seed)
+        mutants = [
+            mutant
+            for mutant in self.mutants_of(source, count, seed)
+            if not survivors or mutant.words in survivors
+        ]
         original = self.path_of(source).read_text()
         [(_, failed, seconds)] = self.runs(source, [original], seed, UNLIMITED_S)
         if failed:
@@ -257,7 +265,7 @@ def difference(path: Path, text: str) -> SourceMutant:
 def entry_of(verdicts: Verdicts, count: int, seed: int) -> record.Entry:
     """What docs/mutants.toml says of a source."""
     return {
-        "mutants": verdicts.tried,
+        "mutants": verdicts.tried + verdicts.equivalent,
         "seed": seed,
         "asked": count,
         "found": verdicts.killed,

@@ -100,6 +100,18 @@ async def the_sum_keeps_the_limit_both_ways(dut):
 
 
 @cocotb.test()
+async def a_sum_at_the_limit_passes_and_one_beyond_it_does_not(dut):
+    model = await begin(dut)
+    await cycle(dut, model, store=1, store_value=0)
+    await cycle(dut, model)
+    for limit in (*range(1, 9), 500, 32766):
+        for size in (limit - 1, limit, limit + 1):
+            for sign in (1, -1):
+                got = await command(dut, model, sign * size, period=1, limit=limit)
+                assert got == sign * min(size, limit)
+
+
+@cocotb.test()
 async def other_results_and_other_axes_pass_unchanged(dut):
     model = await begin(dut)
     for kind in range(8):

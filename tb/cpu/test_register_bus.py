@@ -114,6 +114,20 @@ async def latency_is_1_from_the_answers_to_rdata(dut):
 
 
 @cocotb.test()
+async def each_bit_of_each_answer_is_a_bit_of_the_word(dut):
+    await begin(dut)
+    dut.select.value = 1
+    await FallingEdge(dut.clk)
+    for block in ("memory", *ALONE, *OF_AXES):
+        port = getattr(dut, f"{block}_rdata")
+        for bit in range(len(port)):
+            port.value = 1 << bit
+            await FallingEdge(dut.clk)
+            assert int(dut.rdata.value) == 1 << bit % 32, f"{block}, bit {bit}"
+        port.value = 0
+
+
+@cocotb.test()
 async def no_block_is_selected_at_other_addresses(dut):
     model = await begin(dut)
     for address in (

@@ -3,6 +3,7 @@
 block, and reasons that are kept for existing lines only.
 """
 
+import dataclasses
 import fcntl
 import json
 import threading
@@ -113,8 +114,8 @@ def test_a_fault_that_a_build_leaves_is_looked_for_in_the_builds_with_other_para
 ):
     mutant = next(m for m in mutants_of(divider) if m.kind == "procdff")
     left = [mutant.fault, {"W": 8}]
-    asked = {"block": "tick_divider", "count": 30, "seed": 1, "tests": "", "faults": [left]}
-    (tmp_path / "request").write_text(json.dumps(asked))
+    asked = {"block": "tick_divider", "count": 30, "seed": 1, "tests": "", "labels": []}
+    (tmp_path / "request").write_text(json.dumps({**asked, "faults": [left]}))
     with pytest.raises(pytest.skip.Exception, match="left by this build"):
         of_mutants(tmp_path / "request", source_of("tick_divider"), {"W": 8}, "x")
     of_mutants(tmp_path / "request", source_of("tick_divider"), {"W": 4}, "narrow")
@@ -133,6 +134,18 @@ def test_a_fault_that_a_build_leaves_is_looked_for_in_the_builds_with_other_para
         (tmp_path / "narrow.verdicts").write_text(verdicts)
         builds = blocks.Builds("tick_divider", runs, Run.all(tmp_path))
         assert builds.seen(str(divider), mutant) == (missed is None)
+
+
+def test_only_the_mutants_that_are_asked_for_by_their_labels_are_run(tmp_path, divider):
+    mutant = next(m for m in mutants_of(divider) if m.kind == "procdff")
+    asked = {"block": "tick_divider", "count": 20, "seed": 1, "tests": "", "faults": []}
+    label = block.label("tick_divider", {"W": 8}, mutant)
+    (tmp_path / "request").write_text(json.dumps({**asked, "labels": [label]}))
+    request = tmp_path / "request", source_of("tick_divider")
+    _, environment = of_mutants(*request, {"W": 8}, "x")
+    assert environment["MUTANT_NUMBERS"] == str(mutant.number)
+    with pytest.raises(pytest.skip.Exception, match="none of the mutants"):
+        of_mutants(*request, {"W": 4}, "narrow")
 
 
 def test_every_reason_is_about_a_line_that_exists():
@@ -181,13 +194,13 @@ def subjects(tmp_path, monkeypatch):
     for name in ("one", "two"):
         (tmp_path / f"{name}.sv").write_text(name)
 
-    def measured(name, count, seed):
-        ran.append((name, count, seed))
+    def measured(name, count, seed, survivors):
+        ran.append((name, count, seed, *survivors))
         return name
 
     def entry_of(verdicts, count, seed):
         numbers = dict(mutants=count, asked=count, found=count - 3, equivalent=1, seed=seed)
-        return {**numbers, "survivors": [f"{verdicts}.sv:7: a fault"]}
+        return {**numbers, "survivors": [f"{verdicts}.sv:7: a fault"], "explained": []}
 
     made = command.Subjects(
         lambda: ("one", "two"), "?", lambda n: tmp_path / f"{n}.sv", measured, entry_of
@@ -222,6 +235,25 @@ def test_an_interrupted_run_of_mutants_goes_on_and_another_seed_is_not_recorded(
     ran.clear()
     assert dict(made.recorded(["one"], 10, seed=2))["one"]["seed"] == 2
     assert ran == [("one", 10, 2)] and made.known("one", 10)["seed"] == 1
+
+
+def test_the_survivors_of_the_record_run_again_and_their_verdicts_are_added(subjects, tmp_path):
+    made, ran = subjects
+    dict(made.recorded(["one"], 10))
+    ran.clear()
+    results = dict(mutants=1, found=0, equivalent=0, survivors=[], explained=["one.sv:7: why"])
+    made = dataclasses.replace(made, entry_of=lambda *_: results)
+    entry = made.again("one")
+    assert ran == [("one", 10, 1, "one.sv:7: a fault")]
+    numbers = entry["mutants"], entry["found"], entry["equivalent"]
+    assert numbers == (10, 7, 1) and entry["explained"] == ["one.sv:7: why"]
+    assert not entry["survivors"]
+    results["mutants"] = 2
+    with pytest.raises(block.MutationError, match="2 mutants have the names of 1 survivors"):
+        made.again("one")
+    (tmp_path / "one.sv").write_text("another text")
+    with pytest.raises(block.MutationError, match="no mutants of the source as it is"):
+        made.again("one")
 
 
 def test_the_summary_of_the_record_adds_up_and_names_what_is_missing(tmp_path, monkeypatch):

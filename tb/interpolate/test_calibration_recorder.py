@@ -7,9 +7,9 @@ import random
 
 import cocotb
 import pytest
-from cocotb.triggers import FallingEdge
+from cocotb.triggers import ClockCycles, FallingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.interpolate.calibration_recorder import CalibrationRecorder
 
 IDLE = dict(
@@ -114,6 +114,21 @@ async def one_in_decimation_is_kept_and_0_acts_as_1(dut):
 
 
 @cocotb.test()
+async def a_decimation_counts_with_each_of_its_bits(dut):
+    model, depth = await begin(dut), int(dut.DEPTH.value)
+    needs(depth <= 8, "a burst of 32 samples takes two million cycles")
+    for decimation in (0x5555, 0xAAAB):  # odd, for bits that alternate
+        await cycle(dut, model, start=1, decimation=decimation)
+        dut.start.value, dut.sampled.value = 0, 1
+        await ClockCycles(dut.clk, (depth - 1) * decimation)
+        await FallingEdge(dut.clk)
+        assert not int(dut.full.value)
+        await FallingEdge(dut.clk)
+        assert int(dut.full.value)
+        dut.sampled.value = 0
+
+
+@cocotb.test()
 async def a_disturbance_spoils_the_burst_it_falls_into_and_no_other(dut):
     model, depth = await begin(dut), int(dut.DEPTH.value)
     await cycle(dut, model, disturbed=1)
@@ -142,7 +157,7 @@ async def start_or_reset_in_the_middle_forgets_the_burst(dut):
 async def any_use_matches_the_model_in_every_cycle(dut):
     model, full = await begin(dut), 1 << int(dut.W.value) - 1
     for _ in range(60):
-        phases, decimation = random.getrandbits(1), random.choice((0, 1, 1, 2, 3))
+        phases, decimation = random.getrandbits(1), random.choice((0, 1, 1, 2, 3, 6, 11))
         await cycle(dut, model, start=1, phases=phases, decimation=decimation)
         for _ in range(random.choice((10, 100))):
             await cycle(

@@ -133,7 +133,12 @@ async def the_count_wraps_without_a_disagreement(dut):
 @cocotb.test()
 async def a_difference_shows_up_to_the_wrap_at_65536_periods(dut):
     await begin(dut)
-    for count in (1 << 17, (1 << 18) - 3, 3, 1 << 31):
+    for count in (
+        *(sign << bit for bit in range(2, 18) for sign in (1, -1)),
+        3,
+        (1 << 18) - 3,
+        1 << 31,
+    ):
         await again(dut)
         await settle(dut, 0, 0)
         far = count % (1 << 18) != 0

@@ -267,6 +267,7 @@ async def reset_clears_the_flags_and_the_history(dut):
         flags = await rows(dut, model, *[(11, 30 * n, 0) for n in range(5)])
         assert flags[-1] == ["clipped", "channel_stuck", "no_noise", "comparator_mismatch"]
         model = await begin(dut, sine, **settings)
+        assert not any(int(getattr(dut, name).value) for name in OUTPUTS)
         assert await rows(dut, model, (11, 150, 0), (11, 180, 0)) == [["clipped"]] * 2
 
 
@@ -293,6 +294,21 @@ async def a_step_beyond_jump_and_twice_the_preceding_distance_is_a_jump_from_the
         )
         jumps = [n for n, names in enumerate(flags) if names]
         assert jumps == [7, 9] and flags[7] == ["jumped"]
+
+
+@cocotb.test()
+async def twice_the_larger_of_the_distances_of_both_channels_is_allowed(dut):
+    width = int(dut.W.value)
+    low = -(1 << width - 1)
+    for larger in (1 << bit for bit in range(width - 2)):
+        jump = max(10, larger)
+        for sine in (False, True):
+            for beyond in (0, 1):
+                model = await begin(dut, sine, jump=jump)
+                moved = low + larger - 1, low + larger
+                far = moved[0] + jump + 2 * larger + beyond
+                flags = await rows(dut, model, (low, low), (low, low), moved, (far, moved[1]))
+                assert flags == [[], [], [], ["jumped"] * beyond]
 
 
 @cocotb.test()

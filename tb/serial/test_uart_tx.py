@@ -10,10 +10,12 @@ import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from tb.bench import clk_now, run, start
+from tb.ports import Ports
 from tb.serial.uart_rx import UartRx, character
 from tb.serial.uart_tx import UartTx
 from tools import sigrok
 
+OFFERED = {"valid": 1, "data": 8, "ninth": 1}  # {port: bits}
 BIT_TIMES = [128, 133, 256, 271, 555]  # 1/16 cycle: 8 cycles, …, 115 200 baud at 4 MHz
 
 
@@ -176,6 +178,26 @@ async def any_offer_matches_the_model(dut):
         await begin(dut, bit_time)
         sent = [(random.getrandbits(8), random.getrandbits(1)) for _ in range(12)]
         await send(dut, sent, bit_time, model=UartTx(), gaps=True)
+
+
+@cocotb.test()
+async def any_levels_match_the_model(dut):
+    """Offers that are withdrawn, or come while the driver is still on; and resets."""
+    ports = Ports(dut)
+    for bit_time in (133, 200):
+        await begin(dut, bit_time)
+        model, holds = UartTx(), 0
+        for n in range(4000):
+            if holds == 0:
+                inputs = {name: random.getrandbits(bits) for name, bits in OFFERED.items()}
+                holds = random.randrange(1, random.choice([6, 6, 6, 250]))
+            holds -= 1
+            inputs["rst"] = int(random.random() < 0.002)
+            ports.drive(inputs)
+            await RisingEdge(dut.clk)
+            await FallingEdge(dut.clk)
+            levels = model.step(**inputs, bit_time=bit_time)
+            ports.check(dict(zip(("ready", "tx", "driver_enable"), levels)), n)
 
 
 def heard(waves, options):
