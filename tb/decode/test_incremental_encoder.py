@@ -7,9 +7,9 @@ import random
 
 import cocotb
 import pytest
-from cocotb.triggers import FallingEdge, RisingEdge
+from cocotb.triggers import FallingEdge, RisingEdge, ValueChange
 
-from tb.bench import needs, run, start
+from tb.bench import clk_now, needs, run, start
 from tb.decode.incremental_encoder import IncrementalEncoder, Setup
 from tb.decode.index_latch import Settings
 
@@ -132,6 +132,19 @@ async def latency_is_n_samples_and_2_cycles_from_the_pins(dut):
         bench = await Bench.begin(dut, Setup(required=required))
         out = await bench.play([(1, 0, 0)] * 12)
         assert [row["count"] for row in out].index(1) + 1 == max(required, 1) + 2
+
+
+@cocotb.test()
+async def the_filter_has_each_bit_of_its_settings(dut):
+    for name, width in (("required", "FILTER_W"), ("skip", "SKIP_W")):
+        for value in (1 << bit for bit in range(int(getattr(dut, width).value))):
+            await Bench.begin(dut, Setup(**({"required": 2} | {name: value})))
+            dut.a.value = 1
+            began = clk_now()
+            await ValueChange(dut.count)
+            await FallingEdge(dut.clk)
+            longest = 2 * (value + 1) if name == "skip" else value  # the samples that are required
+            assert longest / 2 <= clk_now() - began - 2 <= longest
 
 
 @cocotb.test()

@@ -4,6 +4,7 @@ against the model.
 """
 
 import random
+from itertools import product
 
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
@@ -220,6 +221,23 @@ async def neither_unknown_kinds_nor_empty_requests_have_an_answer(dut):
 
 
 @cocotb.test()
+async def a_kind_that_differs_from_a_known_one_by_a_high_bit_is_unknown(dut):
+    host = await Requests(dut).reset()
+    await host.clk(events=0xFF)
+    kinds = product((CLEAR, BEGIN_SET, SET, FLASH), range(3, 8))
+    for sequence, (kind, bit) in enumerate(kinds):
+        assert await host.request(sequence, kind | 1 << bit, 0xFF) is None
+    assert (await host.request(99, STATUS))[2] == 0xFF and not host.set and not host.chip
+
+
+@cocotb.test()
+async def the_first_byte_of_the_flags_to_clear_counts_and_no_later_one(dut):
+    host = await Requests(dut).reset()
+    await host.clk(events=0xFF)
+    assert (await host.request(1, CLEAR, 0x01, *[0xFF] * 60))[2] == 0xFE
+
+
+@cocotb.test()
 async def a_frame_that_begins_before_the_answer_is_out_is_dropped_whole(dut):
     host = await Requests(dut).reset()
     for early in range(1, 9):
@@ -253,9 +271,9 @@ async def a_broken_frame_moves_nothing(dut):
 @cocotb.test()
 async def reset_in_mid_flow(dut):
     host = await Requests(dut).reset()
-    for wait in range(0, 60, 3):
+    for wait, kind in product(range(60), (STATUS, BEGIN_SET, FLASH)):
         await host.clk(events=1)
-        await host.send(frame(0x21, [1, random.choice((STATUS, BEGIN_SET, FLASH)), 2, 3]))
+        await host.send(frame(0x21, [2, kind, 2, 3]))  # no repetition
         for _ in range(wait):
             await host.clk()
         host.waits = None
@@ -265,12 +283,24 @@ async def reset_in_mid_flow(dut):
 
 
 @cocotb.test()
+async def reset_forgets_the_frame_that_has_begun(dut):
+    host, check = await Requests(dut).reset(), FrameCheck()
+    words = [(*word, check.word(1, *word)[1]) for word in frame(0x21, [1, STATUS])]
+    for n, (data, command, good) in enumerate(words):
+        await host.clk(rst=int(n == 3))
+        await host.clk(valid=1, data=data, command=command, good=good)
+    for _ in range(20):
+        await host.clk(answer_ready=1)
+    assert not host.sent
+
+
+@cocotb.test()
 async def any_strobes_match_the_model(dut):
     host = await Requests(dut).reset()
     for _ in range(120):
         host.answers = random.choice((1, 2, 9))
         body = [
-            random.randrange(4),
+            random.choice((0, 1, 0x7E, 0x81, 0xFF)),
             random.choice((0, 1, 2, 3, 4, 9)),
             *random.randbytes(random.randrange(12)),
         ]
