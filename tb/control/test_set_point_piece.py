@@ -110,6 +110,35 @@ async def what_breaks_a_limit_is_refused_and_what_meets_it_is_not(dut):
             assert (await pieces.of(set_point=(position, 0), ticks=ticks))[1] is None
 
 
+async def check_limits(pieces, fast, steep):
+    """The piece that was computed last is accepted with these limits, and with none below them."""
+    assert (await pieces.of(limits=(fast, steep)))[1]
+    assert not fast or (await pieces.of(limits=(fast - 1, steep)))[1] is None
+    assert not steep or (await pieces.of(limits=(fast, steep - 1)))[1] is None
+
+
+@cocotb.test()
+async def limits_of_each_size_are_kept_both_ways(dut):
+    pieces = await begin(dut)
+    for bits in range(1, 47):
+        for sign in (1, -1):
+            velocity, change = (sign * random.getrandbits(bits) for _ in range(2))
+            at_begin = (-velocity, velocity - change)
+            await pieces.of(begin=at_begin, set_point=(0, 0), ticks=1, limits=FREE)
+            await check_limits(pieces, abs(velocity), abs(change))
+    for bits in range(4, 46, 2):
+        for sign in (1, -1):
+            ticks, speed = random.randrange(2, 8), sign * random.getrandbits(bits)
+            target = speed + sign * random.getrandbits(min(bits, 28))
+            way = (ticks * (speed + target) + target) // 2 >> 24  # half a tick after the piece
+            at_begin = (0, speed)
+            _, piece = await pieces.of(
+                begin=at_begin, set_point=(way, target), ticks=ticks, limits=FREE
+            )
+            steps = played(at_begin, *piece[:2], ticks)
+            await check_limits(pieces, *(max(abs(step[n]) for step in steps) for n in (1, 2)))
+
+
 @cocotb.test()
 async def a_reset_ends_what_is_being_computed(dut):
     pieces = await begin(dut)
