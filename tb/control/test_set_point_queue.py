@@ -112,6 +112,18 @@ async def a_commit_without_room_is_dropped_and_one_of_no_axis_is_none(dut):
 
 
 @cocotb.test()
+async def words_at_the_same_place_of_other_blocks_are_not_those_of_the_node(dut):
+    queue = await Queue(dut).reset()
+    await queue.write("late_limit", 400)
+    for block in range(1, 256):
+        for name in ("late_limit", "stream_axes", "set_point_commit"):
+            at = address_of("node", name) + 64 * block
+            await queue.clk(stores=1, stored_at=at, stored_value=1)
+    assert int(dut.late_limit.value) == 400
+    assert not int(dut.allowed.value) and not int(dut.waiting.value)
+
+
+@cocotb.test()
 async def random_words_match_the_model(dut):
     queue = await Queue(dut).reset()
     node = [*queue.model.of_node]
