@@ -214,11 +214,12 @@ def of_mutants(request, source, parameters, name):
     choice = asked["count"], asked["seed"], faults
     folder = block.prepared(source, parameters, rtl_path(), *choice)
     found = block.Run.found(file.parent, folder)
+    build = block.build_words(parameters)
     numbers = [
         m.number
         for m in block.mutants_of(folder)
         if m.number not in found
-        and (not asked["labels"] or block.label(source.stem, parameters, m) in asked["labels"])
+        and (not asked["labels"] or block.label(source.stem, build, m) in asked["labels"])
     ]
     if asked["labels"] and not numbers:
         pytest.skip("this build has none of the mutants that are asked for")

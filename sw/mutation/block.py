@@ -88,9 +88,8 @@ def build_words(parameters: netlist.Parameters) -> str:
     return " ".join(f"{name}={Path(str(value)).name}" for name, value in parameters.items())
 
 
-def label(block: str, parameters: netlist.Parameters, mutant: CellMutant) -> str:
-    """The place and the name of a mutant of a block that is built with these parameters."""
-    build = build_words(parameters)
+def label(block: str, build: str, mutant: CellMutant) -> str:
+    """The place and the name of a mutant of a block; build: its parameters in words."""
     return f"{mutant.place}: {block}{' ' if build else ''}{build}: {mutant.name}"
 
 

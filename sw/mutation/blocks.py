@@ -247,7 +247,7 @@ def judge(block: str, runs: Runs, looks: Runs = ()) -> Verdicts:
         compared = equivalence.compared(path, ports, [mutant.number for mutant in unseen])
         for mutant, reason in unseen.items():
             verdict, how = compared[mutant.number]
-            survivor = Survivor(label(block, builds.parameters[folder], mutant), mutant, how)
+            survivor = Survivor(label(block, words, mutant), mutant, how)
             if verdict == equivalence.EQUIVALENT:
                 verdicts.equivalent += 1
             elif reason:
@@ -265,7 +265,7 @@ def simulated(folder: Path, block: str, **asked: object) -> Runs:
     """
     folder.mkdir()
     request = folder / "request"
-    request.write_text(json.dumps({"block": block, **asked}))
+    request.write_text(json.dumps({"block": block, "faults": [], "labels": [], **asked}))
     with open(BUILD / f"{block}.lock", "w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -292,13 +292,12 @@ def measured(
         folder, each = Path(temporary), max(1, round(count / builds_of(block)))
         asked = {"seed": seed, "tests": only}
         labels = [survivor.partition(BEFORE_WORDS)[0] for survivor in survivors]
-        runs = simulated(folder / "runs", block, count=each, faults=[], labels=labels, **asked)
+        runs = simulated(folder / "runs", block, count=each, labels=labels, **asked)
         if not runs:
             raise MutationError(f"{block}: no test has made a build of it")
         looks: Runs = ()
         if (left := Builds(block, runs).left()) and builds_of(block) > 1:
-            asked |= {"faults": left, "labels": []}
-            looks = simulated(folder / "looks", block, count=LOOK, **asked)
+            looks = simulated(folder / "looks", block, count=LOOK, faults=left, **asked)
         return judge(block, runs, looks)
 
 

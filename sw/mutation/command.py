@@ -116,10 +116,10 @@ def different(entry: Mapping[str, Any]) -> int:
     return int(entry["mutants"] - entry["equivalent"])
 
 
-def words_of(name: str, entry: Mapping[str, Any]) -> str:
-    """An entry in some lines: its numbers, and the survivors."""
-    numbers = f"{name}: {entry['found']} of {different(entry)} found"
-    return "\n  ".join([numbers, *entry["survivors"]])
+def words_of(name: str, entry: Mapping[str, Any], numbers: str = "") -> str:
+    """An entry in some lines: its numbers, or these, and the survivors."""
+    numbers = numbers or f"{entry['found']} of {different(entry)} found"
+    return "\n  ".join([f"{name}: {numbers}", *entry["survivors"]])
 
 
 def run(
@@ -165,7 +165,7 @@ def run(
                 verdicts = subjects.measured(name, options.count, options.seed, ())
                 entry = subjects.entry(name, verdicts, options.count, options.seed)
                 stale = verdicts.stale
-                print("\n  ".join([f"{name}: {verdicts.words}", *entry["survivors"]]), flush=True)
+                print(words_of(name, entry, verdicts.words), flush=True)
         except MutationError as error:
             print(error, file=sys.stderr, flush=True)
             wrong += 1

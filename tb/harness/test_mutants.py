@@ -139,7 +139,7 @@ def test_a_fault_that_a_build_leaves_is_looked_for_in_the_builds_with_other_para
 def test_only_the_mutants_that_are_asked_for_by_their_labels_are_run(tmp_path, divider):
     mutant = next(m for m in mutants_of(divider) if m.kind == "procdff")
     asked = {"block": "tick_divider", "count": 20, "seed": 1, "tests": "", "faults": []}
-    label = block.label("tick_divider", {"W": 8}, mutant)
+    label = block.label("tick_divider", "W=8", mutant)
     (tmp_path / "request").write_text(json.dumps({**asked, "labels": [label]}))
     request = tmp_path / "request", source_of("tick_divider")
     _, environment = of_mutants(*request, {"W": 8}, "x")

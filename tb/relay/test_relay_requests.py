@@ -123,6 +123,12 @@ class Requests:
         return bytes(self.sent[2:-4])
 
 
+def checked(words):
+    """(data, command, good) of each word of a frame, as frame_check passes them on."""
+    check = FrameCheck()
+    return [(*word, check.word(1, *word)[1]) for word in words]
+
+
 @cocotb.test()
 async def status_by_hand(dut):
     host = await Requests(dut).reset()
@@ -246,9 +252,7 @@ async def a_frame_that_begins_before_the_answer_is_out_is_dropped_whole(dut):
         await host.send(words[:early])
         while host.model.state != "receive":
             await host.clk(answer_ready=1)
-        check = FrameCheck()
-        passed = [(*word, check.word(1, *word)[1]) for word in words]
-        for data, command, good in passed[early:]:
+        for data, command, good in checked(words)[early:]:
             await host.clk(valid=1, data=data, command=command, good=good)
         for _ in range(20):
             await host.clk()
@@ -284,9 +288,8 @@ async def reset_in_mid_flow(dut):
 
 @cocotb.test()
 async def reset_forgets_the_frame_that_has_begun(dut):
-    host, check = await Requests(dut).reset(), FrameCheck()
-    words = [(*word, check.word(1, *word)[1]) for word in frame(0x21, [1, STATUS])]
-    for n, (data, command, good) in enumerate(words):
+    host = await Requests(dut).reset()
+    for n, (data, command, good) in enumerate(checked(frame(0x21, [1, STATUS]))):
         await host.clk(rst=int(n == 3))
         await host.clk(valid=1, data=data, command=command, good=good)
     for _ in range(20):
